@@ -1,0 +1,5 @@
+"""The one exception that users meet: a single line that says what is wrong and what to do."""
+
+
+class Sdf2vecError(ValueError):
+    """Bad input or a failed write. The message is one line, fit to be shown to a user as it is."""
