@@ -1,0 +1,135 @@
+"""The reference renderer: every shape at every pixel, in plain torch, any dtype, any device.
+
+Slow and simple: it is what everything else is compared with. Memory stays bounded: pixels go in chunks, and
+with gradients each chunk is recomputed in the backward pass.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from functools import cache
+
+import torch
+from torch.utils.checkpoint import checkpoint
+
+from ..blend import COMPOSITING, coverage, display, pixel_size, scene_point, smooth_union
+from ..expr import VEC2, VEC3, VEC4, components_of, scalarize, var
+from ..lower.torch import Tensors, compile_torch
+from ..scene import Scene
+from ..shapes import KINDS
+from .tensors import Group, SceneTensors, from_scene
+
+CHUNK = 1 << 22  # layers × pixels held at a time
+
+
+def render(
+    scene: Scene,
+    width: int | None = None,
+    height: int | None = None,
+    dtype: torch.dtype = torch.float32,
+    device: str = "cpu",
+) -> torch.Tensor:
+    """The scene as a screen shows it: premultiplied RGBA, [4, height, width], 0..1.
+
+    Without a size, at the scene's own. On a canvas of another shape the scene is fitted inside, centred, and
+    what lies beyond its edges shows.
+    """
+    with torch.no_grad():
+        tensors = from_scene(scene, dtype, device)
+        image = composite(tensors, width or scene.width, height or scene.height)
+        return torch.stack(_display()(*image))
+
+
+def composite(tensors: SceneTensors, width: int, height: int) -> torch.Tensor:
+    """Premultiplied RGBA before clamping, [4, height, width], differentiable in every tensor of the scene."""
+    x, y, pixel = canvas(tensors, width, height)
+    step = max(1, CHUNK // max(1, tensors.layer_count))
+    chunks = list(zip(x.split(step), y.split(step), strict=True))
+    if torch.is_grad_enabled() and len(chunks) > 1:
+        parts = [checkpoint(_composite, tensors, *chunk, pixel, use_reentrant=False) for chunk in chunks]
+    else:
+        parts = [_composite(tensors, *chunk, pixel) for chunk in chunks]
+    return torch.cat(parts, dim=1).reshape(4, height, width)
+
+
+def canvas(tensors: SceneTensors, width: int, height: int) -> Tensors:
+    """Scene coordinates x [P], y [P] of all pixel centres, row by row, and the size of a pixel []."""
+    like = tensors.background
+    columns = torch.arange(width, dtype=like.dtype, device=like.device) + 0.5
+    rows = torch.arange(height, dtype=like.dtype, device=like.device) + 0.5
+    y, x = torch.meshgrid(rows, columns, indexing="ij")
+    sizes = [like.new_tensor(value) for value in (width, height, *tensors.size)]
+    return _canvas()(x.flatten(), y.flatten(), *sizes)
+
+
+def _composite(tensors: SceneTensors, x: torch.Tensor, y: torch.Tensor, pixel: torch.Tensor) -> torch.Tensor:
+    layers: dict[int, tuple[torch.Tensor, torch.Tensor, torch.Tensor]] = {}
+    for group in tensors.groups:
+        cover, color = group_coverage(group, x, y, pixel)
+        layers |= zip(group.order.tolist(), zip(cover, color, group.opacity, strict=True), strict=True)
+    blend_color, blend_alpha = _blending(tensors.compositing)
+    rgb = tensors.background[:3, None].expand(3, len(x))
+    alpha = tensors.background[3:].expand(len(x))
+    for index in sorted(layers):
+        cover, color, opacity = layers[index]
+        (rgb,) = blend_color(rgb, color, opacity, cover)
+        (alpha,) = blend_alpha(alpha, opacity, cover)
+    return torch.cat([rgb, alpha[None]])
+
+
+def group_coverage(
+    group: Group, x: torch.Tensor, y: torch.Tensor, pixel: torch.Tensor
+) -> tuple[torch.Tensor, torch.Tensor]:
+    """Coverage [G, P] and colour [G, 3, P or 1] of a group's layers at points x [P], y [P]."""
+    columns = [
+        part[:, index]  # [G, 1]
+        for index in range(group.union_size)
+        for parameter in KINDS[group.kind].parameters
+        for part in group.parameters[parameter.name].split(1, dim=2)
+    ]
+    colors = [part[:, i] for i in range(group.union_size) for part in group.colors.split(1, dim=2)]
+    uniform = (group.falloff[:, None], group.smoothness[:, None])
+    cover, *color = _layer(group.kind, group.union_size)(x, y, pixel, *uniform, *columns, *colors)
+    return cover, torch.stack(color, dim=1)
+
+
+# --- lowered formulas --------------------------------------------------------------------------------------
+
+
+@cache
+def _layer(kind: str, union_size: int) -> Callable[..., Tensors]:
+    """Coverage and colour of a layer."""
+    p, pixel, falloff, smoothness = var("p", VEC2), var("pixel"), var("falloff"), var("smoothness")
+    suffixes = [f"_{i}" for i in range(union_size)]
+    colors = [var(f"color{suffix}", VEC3) for suffix in suffixes]
+    distances = [KINDS[kind].distance(p, *KINDS[kind].variables(suffix)) for suffix in suffixes]
+    distance, color = smooth_union(distances, colors, smoothness)
+    inputs = [*components_of(p), pixel, falloff, smoothness]
+    inputs += [scalar for suffix in suffixes for scalar in KINDS[kind].scalars(suffix)]
+    inputs += [scalar for c in colors for scalar in components_of(c)]
+    return compile_torch([coverage(distance, falloff, pixel), color], inputs)
+
+
+@cache
+def _blending(compositing: str) -> tuple[Callable[..., Tensors], Callable[..., Tensors]]:
+    """One colour channel, and alpha, of laying a layer on what is below."""
+    below, color, opacity, cover = var("below", VEC4), var("color", VEC3), var("opacity"), var("cover")
+    red, _, _, alpha = scalarize(COMPOSITING[compositing](below, color, opacity, cover))
+    below_red, *_, below_alpha = components_of(below)
+    return (
+        compile_torch([red], [below_red, components_of(color)[0], opacity, cover]),
+        compile_torch([alpha], [below_alpha, opacity, cover]),
+    )
+
+
+@cache
+def _display() -> Callable[..., Tensors]:
+    color = var("color", VEC4)
+    return compile_torch([display(color)], components_of(color))
+
+
+@cache
+def _canvas() -> Callable[..., Tensors]:
+    pixel, resolution, size = var("pixel", VEC2), var("resolution", VEC2), var("size", VEC2)
+    inputs = [*components_of(pixel), *components_of(resolution), *components_of(size)]
+    return compile_torch([scene_point(pixel, resolution, size), pixel_size(resolution, size)], inputs)
