@@ -1,3 +1,35 @@
-"""sdf2vec turns a picture into a few soft geometric shapes and those into shaders and SVG."""
+"""sdf2vec turns a picture into a few soft geometric shapes and those into shaders and SVG.
+
+>>> scene = sdf2vec.fit("photo.png", shapes=64)
+>>> text = scene.to("glsl")
+"""
+
+# The packages `fit`, `render` and `export` come first: once they are imported, nothing
+# rebinds the names of the functions below. None of them imports torch.
+import sdf2vec.export
+import sdf2vec.fit
+import sdf2vec.render  # noqa: F401 (see above)
+
+from .api import check, export, fit, render
+from .errors import Sdf2vecError
+from .scene import Layer, Scene, SceneError, Shape, dumps, load, loads, save
+from .shapes import KINDS
 
 __version__ = "0.1.0"
+
+__all__ = [
+    "KINDS",
+    "Layer",
+    "Scene",
+    "SceneError",
+    "Sdf2vecError",
+    "Shape",
+    "check",
+    "dumps",
+    "export",
+    "fit",
+    "load",
+    "loads",
+    "render",
+    "save",
+]

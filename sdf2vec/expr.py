@@ -624,6 +624,39 @@ def walk(roots: Iterable[Expr]) -> Iterator[Expr]:
             stack.extend((arg, False) for arg in reversed(node.args))
 
 
+def substitute(expr: Expr, values: Mapping[Expr, Expr]) -> Expr:
+    """The expression with the nodes that are keys of `values` replaced; it folds anew."""
+    done: dict[Expr, Expr] = {}
+    for node in walk([expr]):
+        done[node] = values.get(node) or _rebuild(node, tuple(done[arg] for arg in node.args))
+    return done[expr]
+
+
+def _rebuild(node: Expr, args: tuple[Expr, ...]) -> Expr:
+    if args == node.args:
+        return node
+    if node.op in OPERATIONS:
+        return operation(node.op, *args)
+    if node.op == "component":
+        assert isinstance(node.payload, int)
+        return component(args[0], node.payload)
+    return _node(node.op, args, node.type, node.payload)
+
+
+def hoist(expr: Expr, varying: Expr) -> list[Expr]:
+    """The largest parts of `expr`, constants aside, that do not depend on `varying`, in a fixed order.
+
+    They can be computed once and replaced by table entries. Calls are looked at from outside only.
+    """
+    depends: set[Expr] = set()
+    candidates: list[Expr] = []
+    for node in walk([expr]):
+        if node is varying or any(arg in depends for arg in node.args):
+            depends.add(node)
+            candidates += [arg for arg in node.args if arg not in depends and arg.op != "const"]
+    return list(dict.fromkeys(candidates))
+
+
 def scalarize(expr: Expr) -> tuple[Expr, ...]:
     """The same value as one float (or bool) expression per component: no vectors, calls or lets remain.
 

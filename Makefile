@@ -1,0 +1,74 @@
+# sdf2vec: `make demo` converts the example picture, `make test` checks everything.
+#
+# Needs Python 3.11 or newer with its venv module; everything else goes into .venv.
+# Variables, for example `make PYTHON=python3.12 demo`:
+#   PYTHON  the interpreter that .venv is made with
+#   VENV    the folder of the virtual environment
+#   TORCH   what pip installs first; `make TORCH=torch demo` takes the newest PyTorch. Which build that is
+#           (CPU, CUDA, ROCm) depends on where pip looks: set PIP_INDEX_URL or PIP_FIND_LINKS for another.
+#           Read once, when .venv is made: `make distclean` first to change it.
+
+PYTHON ?= python3
+VENV ?= .venv
+TORCH ?= torch==2.13.0
+
+BIN := $(VENV)/bin
+PIP := $(BIN)/python -m pip --disable-pip-version-check
+
+# Software OpenGL and Vulkan, Khronos' GLSL compiler, and cairo for the PDF export.
+ENGINES := libegl1 libegl-mesa0 libgl1 libgl1-mesa-dri libgbm1 libgles2 mesa-vulkan-drivers libvulkan1 \
+           glslang-tools libcairo2
+
+.DEFAULT_GOAL := demo
+.PHONY: demo test lint format engines clean distclean
+
+demo: $(VENV)/.installed
+	$(BIN)/sdf2vec examples/coffee.png --shapes 64 --seed 0 --emit json,glsl,shadertoy,wgsl,svg,png -o out/demo
+
+test: engines lint
+	$(BIN)/python -m pytest
+
+lint: $(VENV)/.installed-test
+	$(BIN)/ruff check
+	$(BIN)/ruff format --check
+	$(BIN)/mypy
+
+format: $(VENV)/.installed-test
+	$(BIN)/ruff check --fix
+	$(BIN)/ruff format
+
+# Without them the tests that draw on real engines are skipped and say so; where CI is set they fail.
+engines:
+	@if dpkg -s $(ENGINES) >/dev/null 2>&1; then exit 0; fi; \
+	echo "Installing the system packages of the rendering engines: $(ENGINES)"; \
+	if [ "$$(id -u)" -eq 0 ]; then root=; elif command -v sudo >/dev/null; then root=sudo; else root=false; fi; \
+	if command -v apt-get >/dev/null && $$root apt-get update -q \
+	  && $$root env DEBIAN_FRONTEND=noninteractive apt-get install -q -y --no-install-recommends $(ENGINES); \
+	then exit 0; fi; \
+	echo "NOT INSTALLED: the packages above (apt-get is absent or failed, or root's rights are wanted)." >&2; \
+	case "$${CI:-}" in ""|0|[Ff]alse|[Nn]o) echo "Tests that need them will be skipped." >&2;; *) exit 1;; esac
+
+clean:
+	rm -rf out build dist .pytest_cache .mypy_cache .ruff_cache .hypothesis
+	find sdf2vec tests -name __pycache__ -prune -exec rm -rf {} +
+
+distclean: clean
+	rm -rf $(VENV)
+
+# Stamps: each is newer than what it was made from, so that a second run has nothing to install.
+
+$(VENV)/.torch:
+	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11))' \
+	  || { echo "Python 3.11 or newer is needed: make PYTHON=python3.11" >&2; exit 1; }
+	@test -x $(BIN)/pip || $(PYTHON) -m venv $(VENV) \
+	  || { rm -rf $(VENV); echo "No virtual environment could be made. On Debian: apt-get install python3-venv" >&2; exit 1; }
+	$(PIP) install "$(TORCH)"
+	@touch $@
+
+$(VENV)/.installed: pyproject.toml $(VENV)/.torch
+	$(PIP) install -e .
+	@touch $@
+
+$(VENV)/.installed-test: pyproject.toml $(VENV)/.torch
+	$(PIP) install -e '.[test]'
+	@touch $@

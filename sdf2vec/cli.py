@@ -1,0 +1,454 @@
+"""The command line: parses, calls the API, prints. Torch is imported only when there is work for it."""
+
+from __future__ import annotations
+
+import argparse
+import io
+import signal
+import sys
+import time
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from types import FrameType
+from typing import TYPE_CHECKING, Literal, NoReturn
+
+from . import __version__, api
+from .errors import Sdf2vecError
+from .export import EXPORTERS
+from .export.options import GLSL_VERSIONS, LAYOUTS, Options
+from .files import one_line, write_atomically
+from .fit.presets import DEFAULT, PRESETS
+from .image import Picture, load
+from .scene import Scene
+from .scene import load as load_scene
+from .scene import loads as loads_scene
+from .shapes import KINDS
+
+if TYPE_CHECKING:
+    from .fit.loop import Progress
+    from .roundtrip import Check
+
+STREAM = "-"
+OK, FAILED, INTERRUPTED = 0, 2, 130
+
+
+def main(argv: Sequence[str] | None = None) -> NoReturn:
+    """Entry point: exits with 0, with 2 after one line on stderr, or with 130 when interrupted twice."""
+    arguments = list(sys.argv[1:] if argv is None else argv)
+    run = COMMANDS.get(arguments[0]) if arguments else None
+    try:
+        sys.exit(run(arguments[1:]) if run else _convert(arguments))
+    except Sdf2vecError as error:
+        _complain(str(error))
+        sys.exit(FAILED)
+    except KeyboardInterrupt:
+        _complain("interrupted")
+        sys.exit(INTERRUPTED)
+    except BrokenPipeError:
+        sys.stderr.close()
+        sys.exit(OK)
+
+
+def _complain(message: str) -> None:
+    print(f"sdf2vec: {one_line(message)}", file=sys.stderr)
+
+
+class _Parser(argparse.ArgumentParser):
+    """An argument parser whose errors are one line."""
+
+    def error(self, message: str) -> NoReturn:
+        raise Sdf2vecError(f"{message} (see {self.prog} --help)")
+
+
+# --- the main job: pictures in, exports out -----------------------------------------------------------------
+
+
+def _convert_parser() -> argparse.ArgumentParser:
+    parser = _Parser(
+        prog="sdf2vec",
+        usage="sdf2vec INPUT... [--emit TARGETS] [-o OUT] [options]",
+        description="Fits a few soft geometric shapes to pictures and exports them as mathematics.",
+        epilog="Other commands, each with its own --help: sdf2vec check | render | export",
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+    )
+    parser.add_argument("inputs", nargs="+", metavar="INPUT", help="pictures; - reads standard input")
+    _add_emit(parser, "glsl")
+    _add_output(parser)
+    parser.add_argument("--shapes", type=int, default=256, metavar="N", help="how many shapes (default: 256)")
+    parser.add_argument(
+        "--kind",
+        default="triangle",
+        metavar="KIND",
+        help=f"{', '.join(KINDS)}, mixed, or several: box,circle",
+    )
+    parser.add_argument("--compositing", default="over", help="over (default) or additive")
+    parser.add_argument("--preset", default=DEFAULT, help=f"{', '.join(PRESETS)} (default: {DEFAULT})")
+    parser.add_argument("--loss", help=f"{', '.join(api.LOSS_NAMES)} (default: the preset's)")
+    parser.add_argument("--seed", type=int, default=0, help="the same seed gives the same scene (default: 0)")
+    _add_options(parser)
+    parser.add_argument("--quiet", action="store_true", help="print errors only")
+    parser.add_argument("--version", action="version", version=f"sdf2vec {__version__}")
+    return parser
+
+
+def _add_emit(parser: argparse.ArgumentParser, default: str) -> None:
+    listed = "; ".join(f"{name}: {exporter.about}" for name, exporter in EXPORTERS.items())
+    parser.add_argument(
+        "--emit",
+        action="append",
+        metavar="TARGETS",
+        help=f"what to write, separated by commas (default: {default}). {listed}",
+    )
+
+
+def _add_output(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument(
+        "-o",
+        "--output",
+        metavar="OUT",
+        help="a file for one input and one target, else a folder; - writes standard output (default: this folder)",
+    )
+
+
+def _add_options(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument("--size", type=int, metavar="PIXELS", help="shortest side of a PNG")
+    parser.add_argument("--glsl", default="es300", help=f"GLSL version: {', '.join(GLSL_VERSIONS)}")
+    parser.add_argument("--layout", default="auto", help=f"how shaders hold shapes: {', '.join(LAYOUTS)}")
+
+
+@dataclass(frozen=True)
+class _Job:
+    """One input and the files to write for it."""
+
+    source: str
+    outputs: dict[str, str]  # target → path or "-"
+
+
+def _convert(arguments: list[str]) -> int:
+    parser = _convert_parser()
+    if not arguments:
+        parser.error("no picture given")
+    options = parser.parse_intermixed_args(arguments)
+    targets = _targets(options.emit, "glsl")
+    jobs = _plan(options.inputs, targets, options.output)
+    _check_settings(options)
+    status = OK
+    for job in jobs:
+        try:
+            stopped = _convert_one(job, options)
+        except Sdf2vecError as error:
+            _complain(str(error))
+            status = FAILED
+            continue
+        if stopped:
+            return INTERRUPTED
+    return status
+
+
+def _check_settings(options: argparse.Namespace) -> None:
+    """Refuses impossible settings before any work is done."""
+    api.check_settings(
+        options.shapes, _kinds(options), options.compositing, options.preset, options.loss, options.seed
+    )
+    Options(size=options.size, glsl=options.glsl, layout=options.layout)
+
+
+def _kinds(options: argparse.Namespace) -> list[str]:
+    return [name.strip() for name in options.kind.split(",") if name.strip()]
+
+
+def _convert_one(job: _Job, options: argparse.Namespace) -> bool:
+    """Fits one picture and writes its exports; True when the user stopped the fit."""
+    say = _speaker(options.quiet, STREAM in job.outputs.values())
+    picture = _read_picture(job.source)
+    for note in picture.notes:
+        say(note)
+    started = time.perf_counter()
+    with _stopping() as stop, _progress(options.quiet) as report:
+
+        def callback(progress: Progress) -> bool:
+            report(progress)
+            return stop.requested
+
+        scene = api.fit(
+            picture,
+            options.shapes,
+            kind=_kinds(options),
+            compositing=options.compositing,
+            preset=options.preset,
+            loss=options.loss,
+            seed=options.seed,
+            callback=callback,
+        )
+        seconds = time.perf_counter() - started
+        quality = api.psnr(scene, picture)
+        early = ", stopped early" if stop.requested else ""
+        size = f"{picture.width} x {picture.height}"
+        say(
+            f"{_name(job.source)}: {size}, {scene.shape_count} shapes, PSNR {quality:.2f} dB, {seconds:.1f} s{early}"
+        )
+        _write_exports(scene, job, options, say)
+        return stop.requested
+
+
+def _read_picture(source: str) -> Picture:
+    if source != STREAM:
+        return load(source)
+    return load(io.BytesIO(sys.stdin.buffer.read()))
+
+
+def _name(source: str) -> str:
+    return "standard input" if source == STREAM else source
+
+
+def _write_exports(scene: Scene, job: _Job, options: argparse.Namespace, say: Callable[[str], None]) -> None:
+    title = "a picture" if job.source == STREAM else Path(job.source).name
+    for target, path in job.outputs.items():
+        data = api.export(
+            scene, target, size=options.size, glsl=options.glsl, layout=options.layout, title=title
+        )
+        raw = data.encode() if isinstance(data, str) else data
+        _write(path, raw)
+        if path != STREAM:
+            say(f"  {path}: {len(raw):,} bytes{_figure(scene, target)}")
+
+
+def _write(path: str, data: bytes) -> None:
+    if path == STREAM:
+        sys.stdout.buffer.write(data)
+        sys.stdout.buffer.flush()
+    else:
+        write_atomically(path, data)
+
+
+def _figure(scene: Scene, target: str) -> str:
+    """How near the export comes to the render, where an engine can tell; at the fitted size."""
+    from .roundtrip import ROUND_TRIPS, default_sizes
+
+    if target not in ROUND_TRIPS:
+        return ""
+    trip = ROUND_TRIPS[target]
+    try:
+        result = api.check(scene, [target], default_sizes(scene, trip)[:1])[0]
+    except Sdf2vecError as error:
+        return f"; not checked: {one_line(str(error))}"
+    if result.missing:
+        return ""
+    return (
+        f"; {result.engine} draws it at {result.psnr:.1f} dB, largest error {result.largest_error:.2g} levels"
+    )
+
+
+# --- where things go ----------------------------------------------------------------------------------------
+
+
+def _targets(emit: list[str] | None, default: str) -> list[str]:
+    names = [name.strip() for text in emit or [default] for name in text.split(",")]
+    targets = list(dict.fromkeys(name for name in names if name))
+    if not targets:
+        raise Sdf2vecError(f"--emit names nothing; choose from {', '.join(EXPORTERS)}")
+    api.check_targets(targets)
+    return targets
+
+
+def _plan(inputs: list[str], targets: list[str], output: str | None) -> list[_Job]:
+    """Which file each export goes to. Raises Sdf2vecError when two would share one or an input be overwritten."""
+    single = len(inputs) == len(targets) == 1
+    if output == STREAM and not single:
+        raise Sdf2vecError("standard output takes one input and one target; give a folder with -o")
+    jobs = [_Job(source, _outputs(source, targets, output, single)) for source in inputs]
+    taken: dict[str, str] = {}
+    sources = {str(Path(source).resolve()) for source in inputs if source != STREAM}
+    for job in jobs:
+        for path in job.outputs.values():
+            _claim(path, job.source, taken, sources)
+    return jobs
+
+
+def _claim(path: str, source: str, taken: dict[str, str], sources: set[str]) -> None:
+    if path == STREAM:
+        return
+    resolved = str(Path(path).resolve())
+    if resolved in sources:
+        raise Sdf2vecError(f"{path}: would overwrite an input; choose another -o")
+    if resolved in taken:
+        raise Sdf2vecError(
+            f"{path}: both {taken[resolved]} and {source} would be written there; convert them apart"
+        )
+    taken[resolved] = source
+
+
+def _outputs(source: str, targets: list[str], output: str | None, single: bool) -> dict[str, str]:
+    if output == STREAM:
+        return {targets[0]: STREAM}
+    folder = Path(output or ".")
+    if single and output and not folder.is_dir() and not output.endswith(("/", "\\")):
+        return {targets[0]: output}
+    if folder.exists() and not folder.is_dir():
+        raise Sdf2vecError(f"{output}: is a file, but a folder is needed for several outputs")
+    stem = "picture" if source == STREAM else Path(source).name.removesuffix(".scene.json")
+    stem = Path(stem).stem if source != STREAM and not source.endswith(".scene.json") else stem
+    return {target: str(folder / f"{stem}{EXPORTERS[target].suffix}") for target in targets}
+
+
+# --- progress and interruption ------------------------------------------------------------------------------
+
+
+class _Stop:
+    """Set by the first Ctrl-C; the second one interrupts as usual."""
+
+    requested = False
+
+
+@contextmanager
+def _stopping() -> Iterator[_Stop]:
+    stop = _Stop()
+
+    def request(number: int, frame: FrameType | None) -> None:
+        stop.requested = True
+        signal.signal(signal.SIGINT, signal.default_int_handler)
+
+    before = signal.signal(signal.SIGINT, request)
+    try:
+        yield stop
+    finally:
+        signal.signal(signal.SIGINT, before)
+
+
+@contextmanager
+def _progress(quiet: bool) -> Iterator[Callable[[Progress], None]]:
+    """A progress bar on a terminal, nothing elsewhere."""
+    if quiet or not sys.stderr.isatty():
+        yield lambda progress: None
+        return
+    from rich.console import Console
+    from rich.progress import BarColumn, TextColumn, TimeRemainingColumn
+    from rich.progress import Progress as Bar
+
+    columns = (
+        TextColumn("{task.description:>7}"),
+        BarColumn(),
+        TextColumn("step {task.completed:.0f}/{task.total:.0f}  loss {task.fields[loss]:.5f}"),
+        TimeRemainingColumn(),
+    )
+    with Bar(*columns, console=Console(stderr=True), transient=True) as bar:
+        task = bar.add_task("start", total=1, loss=0.0)
+
+        def report(progress: Progress) -> None:
+            bar.update(
+                task,
+                description=progress.phase,
+                completed=progress.step,
+                total=progress.steps,
+                loss=progress.loss,
+            )
+
+        yield report
+
+
+def _speaker(quiet: bool, to_stderr: bool) -> Callable[[str], None]:
+    """Prints a line on stdout, or on stderr when stdout carries an export."""
+
+    def say(line: str) -> None:
+        if not quiet:
+            print(line, file=sys.stderr if to_stderr else sys.stdout, flush=True)
+
+    return say
+
+
+# --- scene files --------------------------------------------------------------------------------------------
+
+
+def _read_scene(source: str) -> Scene:
+    if source != STREAM:
+        return load_scene(source)
+    try:
+        return loads_scene(sys.stdin.buffer.read())
+    except Sdf2vecError as error:
+        raise Sdf2vecError(f"standard input: {error}") from None
+
+
+def _render_command(arguments: list[str]) -> int:
+    parser = _Parser(prog="sdf2vec render", description="Renders a scene file as PNG.")
+    parser.add_argument("scene", help="a .scene.json file; - reads standard input")
+    parser.add_argument("--size", type=int, metavar="PIXELS", help="shortest side (default: as fitted)")
+    _add_output(parser)
+    return _write_scene_exports(parser, parser.parse_args(arguments), ["png"])
+
+
+def _export_command(arguments: list[str]) -> int:
+    parser = _Parser(prog="sdf2vec export", description="Exports a scene file, without fitting anew.")
+    parser.add_argument("scene", help="a .scene.json file; - reads standard input")
+    _add_emit(parser, "glsl")
+    _add_output(parser)
+    _add_options(parser)
+    options = parser.parse_args(arguments)
+    return _write_scene_exports(parser, options, _targets(options.emit, "glsl"))
+
+
+def _write_scene_exports(
+    parser: argparse.ArgumentParser, options: argparse.Namespace, targets: list[str]
+) -> int:
+    options = argparse.Namespace(**{"glsl": "es300", "layout": "auto", **vars(options)})
+    (job,) = _plan([options.scene], targets, options.output)
+    Options(size=options.size, glsl=options.glsl, layout=options.layout)
+    scene = _read_scene(options.scene)
+    _write_exports(scene, job, options, _speaker(False, STREAM in job.outputs.values()))
+    return OK
+
+
+def _check_command(arguments: list[str]) -> int:
+    parser = _Parser(
+        prog="sdf2vec check",
+        description="Re-renders each export of a scene file on the engines present and compares it with the render.",
+    )
+    parser.add_argument("scene", help="a .scene.json file; - reads standard input")
+    parser.add_argument("--emit", action="append", metavar="TARGETS", help="only these targets")
+    options = parser.parse_args(arguments)
+    targets = _targets(options.emit, "glsl") if options.emit else None
+    results = api.check(_read_scene(options.scene), targets)
+    _print_table(results)
+    if all(result.missing for result in results):
+        raise Sdf2vecError(f"no engine could check anything: {results[0].missing}")
+    return OK if all(result.verdict != "differs" for result in results) else 1
+
+
+def _print_table(results: list[Check]) -> None:
+    from rich.console import Console
+    from rich.table import Table
+
+    table = Table(box=None, pad_edge=False)
+    for name, justify in TABLE_COLUMNS.items():
+        table.add_column(name, justify=justify)
+    for r in results:
+        numbers = (
+            f"{r.width} x {r.height}",
+            f"{r.psnr:.1f}",
+            f"{r.largest_error:.3f}",
+            f"{r.mean_error:+.4f}",
+        )
+        row = ("", "", "", "") if r.missing else numbers
+        table.add_row(r.target, r.engine, *row, f"{r.verdict}: {r.missing}" if r.missing else r.verdict)
+    Console(width=None if sys.stdout.isatty() else 200).print(table)
+
+
+TABLE_COLUMNS: dict[str, Literal["left", "right"]] = {
+    "target": "left",
+    "engine": "left",
+    "size": "right",
+    "PSNR dB": "right",
+    "largest error": "right",
+    "mean error": "right",
+    "verdict": "left",
+}
+
+COMMANDS: dict[str, Callable[[list[str]], int]] = {
+    "check": _check_command,
+    "render": _render_command,
+    "export": _export_command,
+}
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,64 @@
+"""What the engines have in common: their record, their error and their checks."""
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sdf2vec.errors import Sdf2vecError
+
+Picture = NDArray[np.float32]  # [height, width, 4], row 0 is the top of the picture
+Uniforms = Mapping[str, float | tuple[float, ...]]
+
+LARGEST_SIDE = 16384
+LARGEST_AREA = 2**26  # one gibibyte of float32 RGBA
+
+
+class EngineError(Sdf2vecError):
+    """An engine is missing or refuses what it was given; `log` holds the engine's whole answer."""
+
+    def __init__(self, message: str, log: str = "") -> None:
+        super().__init__(" ".join(message.split()))
+        self.log = log or message
+
+
+@dataclass(frozen=True)
+class Engine:
+    """A program that draws an export without this package's own renderer.
+
+    `missing()` is None where the engine works and otherwise one line on how to get it; it never raises.
+    `render(text, width, height, ...)` returns float32 RGBA `[height, width, 4]`, row 0 at the top.
+    """
+
+    name: str
+    missing: Callable[[], str | None]
+    render: Callable[..., Picture]
+
+
+def reason_missing(probe: Callable[[], object], advice: str) -> str | None:
+    """None if `probe()` works, else one line: what failed and the advice that mends it."""
+    try:
+        probe()
+    except ModuleNotFoundError as error:
+        return f"the Python package {error.name} is not installed: pip install 'sdf2vec[check]'"
+    except (
+        Exception
+    ) as error:  # a driver may fail in any way; the caller asked for a line, not for a traceback
+        return f"{' '.join(str(error).split()) or type(error).__name__}; {advice}"
+    return None
+
+
+def require_present(reason: str | None) -> None:
+    """Raises EngineError with the reason why an engine is missing, if there is one."""
+    if reason is not None:
+        raise EngineError(reason)
+
+
+def require_drawable(width: int, height: int) -> None:
+    """Raises EngineError for a size in pixels that no engine should be asked for."""
+    if not (1 <= width <= LARGEST_SIDE and 1 <= height <= LARGEST_SIDE and width * height <= LARGEST_AREA):
+        raise EngineError(
+            f"cannot draw {width} × {height} pixels: "
+            f"a side has 1 to {LARGEST_SIDE}, the picture at most {LARGEST_AREA}"
+        )

@@ -1,0 +1,64 @@
+"""Writing files so that a reader never meets half of one."""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import secrets
+from pathlib import Path
+
+from sdf2vec.errors import Sdf2vecError
+
+_REFUSALS: dict[type[OSError], str] = {
+    FileNotFoundError: "no such folder",
+    IsADirectoryError: "is a folder, not a file",
+    NotADirectoryError: "part of the path is a file, not a folder",
+    PermissionError: "no permission to write here",
+    FileExistsError: "part of the path is a file, not a folder",
+}
+
+
+def write_atomically(path: str | os.PathLike[str], data: bytes) -> None:
+    """Write `data` to `path` so that the file is either complete or untouched.
+
+    The bytes go to a new file in the same folder, which is then renamed over `path`; on failure that new
+    file is removed. Missing parent folders are created. Permissions are those of any newly created file
+    (0666 less the umask), a symbolic link keeps pointing where it did, and a device or pipe is written to
+    directly, because replacing it by a file is never what was asked for.
+
+    Raises Sdf2vecError when the folder cannot be written to, `path` is a folder, the disk is full, and so on.
+    """
+    try:
+        target = Path(os.path.realpath(path))
+        if target.is_dir():
+            raise IsADirectoryError
+        if target.exists() and not target.is_file():
+            target.write_bytes(data)
+        else:
+            target.parent.mkdir(parents=True, exist_ok=True)
+            _write_and_rename(target, data)
+    except (OSError, ValueError) as error:  # ValueError: a NUL character in the path
+        raise Sdf2vecError(f"{one_line(os.fspath(path))}: {_reason(error)}; choose another place") from error
+
+
+def one_line(text: str) -> str:
+    """`text` fit for one line of a message: control characters and undecodable bytes as escapes."""
+    return "".join(c if c.isprintable() else c.encode("unicode_escape").decode() for c in text) or "''"
+
+
+def _write_and_rename(target: Path, data: bytes) -> None:
+    beside = target.parent / f".sdf2vec-{secrets.token_hex(8)}.tmp"
+    try:
+        with open(beside, "xb") as stream:
+            stream.write(data)
+            stream.flush()
+            os.fsync(stream.fileno())  # else a power cut may keep the new name and lose the bytes
+        os.replace(beside, target)
+    finally:
+        with contextlib.suppress(FileNotFoundError):
+            beside.unlink()
+
+
+def _reason(error: Exception) -> str:
+    plain = f"cannot write it ({getattr(error, 'strerror', None) or error})"
+    return next((line for kind, line in _REFUSALS.items() if type(error) is kind), plain)

@@ -1,0 +1,128 @@
+"""The fit: render, loss, backward, step. What happens when is data (`presets`)."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+import torch
+
+from ..image import Picture, premultiply, resize
+from ..render.reference import composite
+from ..render.tensors import SceneTensors, to_scene
+from ..scene import Scene
+from .constraints import project
+from .losses import total_loss
+from .placing import place
+from .presets import DEFAULT, PRESETS, RATES, Loss, Phase
+
+
+@dataclass(frozen=True)
+class Settings:
+    """What to fit and how. `kinds`: names in `shapes.KINDS`; `loss`: replaces the preset's, when given."""
+
+    shapes: int = 256
+    kinds: tuple[str, ...] = ("triangle",)
+    compositing: str = "over"
+    preset: str = DEFAULT
+    loss: Loss | None = None
+    seed: int = 0
+
+
+@dataclass(frozen=True)
+class Progress:
+    """Where a fit stands; `step` counts over all phases."""
+
+    phase: str
+    step: int
+    steps: int
+    loss: float
+
+
+Callback = Callable[[Progress], bool]  # returns True to stop
+
+
+def fit_picture(picture: Picture, settings: Settings, callback: Callback = lambda progress: False) -> Scene:
+    """Fits shapes to a picture. The same settings give the same scene.
+
+    The callback runs after every step; when it returns True, the fit ends and what is there is returned.
+    """
+    generator = torch.Generator().manual_seed(settings.seed)
+    phases = [_with_loss(phase, settings.loss) for phase in PRESETS[settings.preset]]
+    pixels = premultiply(picture.pixels) if picture.has_alpha else picture.pixels
+    shortest = min(picture.width, picture.height)
+    size = (picture.width / shortest, picture.height / shortest)
+    start = scaled(pixels, phases[0].resolution)
+    tensors = place(start, size, settings.kinds, settings.shapes, settings.compositing, generator)
+    optimise(tensors, pixels, phases, callback)
+    return to_scene(tensors, picture.width, picture.height)
+
+
+def optimise(tensors: SceneTensors, pixels: np.ndarray, phases: Sequence[Phase], callback: Callback) -> None:
+    """Runs the phases on a scene in place. `pixels`: premultiplied [H, W, 3 or 4]."""
+    optimizer = _adam(tensors)
+    pixel = 1.0 / min(pixels.shape[:2])
+    steps = sum(phase.steps for phase in phases)
+    done = 0
+    for phase in phases:
+        target = scaled(pixels, phase.resolution)
+        for rate in _rates(phase):
+            loss = _step(tensors, target, phase.loss, optimizer, rate)
+            project(tensors, pixel)
+            done += 1
+            if callback(Progress(phase.name, done, steps, loss)):
+                return
+
+
+def _step(
+    tensors: SceneTensors, target: torch.Tensor, loss: Loss, optimizer: torch.optim.Optimizer, rate: float
+) -> float:
+    optimizer.zero_grad(set_to_none=True)
+    channels, height, width = target.shape
+    value = total_loss(loss, composite(tensors, width, height)[:channels], target)
+    value.backward()
+    for group in optimizer.param_groups:
+        group["lr"] = group["base_rate"] * rate
+    optimizer.step()
+    return float(value.detach())
+
+
+def _adam(tensors: SceneTensors) -> torch.optim.Adam:
+    """Adam over all that may move, each tensor at the rate of what it means."""
+    groups = [(name, tensor) for group in tensors.groups for name, tensor in group.tensors()]
+    if tensors.transparent:
+        free = groups
+    else:
+        free = [
+            (name, tensor) for name, tensor in groups if name != "opacity" or tensors.compositing == "over"
+        ]
+        free.append(("background", tensors.background))
+    return torch.optim.Adam(
+        [
+            {"params": [tensor.requires_grad_()], "lr": RATES[name], "base_rate": RATES[name]}
+            for name, tensor in free
+        ],
+        betas=(0.9, 0.99),
+        eps=1e-12,
+    )
+
+
+def _rates(phase: Phase) -> Iterator[float]:
+    """The factor on all rates at each step of a phase."""
+    for step in range(phase.steps):
+        fall = 0.5 - 0.5 * math.cos(math.pi * step / max(1, phase.steps - 1))
+        yield phase.rate + (phase.end_rate - phase.rate) * fall
+
+
+def scaled(pixels: np.ndarray, resolution: int) -> torch.Tensor:
+    """The picture scaled down to about resolution² pixels, [C, H, W]; never up."""
+    height, width = pixels.shape[:2]
+    factor = min(1.0, resolution / math.sqrt(width * height))
+    small = resize(pixels, max(1, round(width * factor)), max(1, round(height * factor)))
+    return torch.from_numpy(np.ascontiguousarray(small.transpose(2, 0, 1)))
+
+
+def _with_loss(phase: Phase, loss: Loss | None) -> Phase:
+    return replace(phase, loss=loss) if loss else phase

@@ -1,0 +1,413 @@
+"""Pictures in and out. File formats, orientation, colour, alpha and pixel centres are settled here only.
+
+Everywhere else a picture is a float array [H, W, 3] (opaque) or [H, W, 4] (straight alpha) of sRGB-coded
+values 0..1, upright, row 0 at the top. Pixel (row, column) has its centre at (column + 0.5, row + 0.5).
+"""
+
+from __future__ import annotations
+
+import functools
+import io
+import os
+import threading
+import warnings
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from typing import Any, BinaryIO
+
+import numpy as np
+from numpy.typing import NDArray
+from PIL import Image, ImageChops, ImageCms
+
+from sdf2vec.errors import Sdf2vecError
+from sdf2vec.files import one_line
+
+Floats = NDArray[np.float32]
+
+MAX_PIXELS = 200_000_000
+"""Pictures with more pixels than this are refused before they are decoded."""
+
+# Pillow reads more formats than these, some by starting other programs (EPS), so the list is closed.
+_FORMATS = ("PNG", "JPEG", "WEBP", "AVIF", "TIFF", "GIF", "BMP")
+_READABLE = "PNG, JPEG, WebP, AVIF, TIFF, GIF, BMP"
+
+_FULL_SCALE = {"bool": 1, "uint8": 255, "uint16": 65535}
+_RANGE_SLACK = 0.01  # resampling overshoots 0..1 by a little; more than this is another scale
+
+_ORIENTATION_TAG = 0x0112
+# EXIF 2.32, 4.6.4.A "Orientation": what turns the stored picture upright. 1 is upright already.
+_UPRIGHT = {
+    2: Image.Transpose.FLIP_LEFT_RIGHT,
+    3: Image.Transpose.ROTATE_180,
+    4: Image.Transpose.FLIP_TOP_BOTTOM,
+    5: Image.Transpose.TRANSPOSE,
+    6: Image.Transpose.ROTATE_270,
+    7: Image.Transpose.TRANSVERSE,
+    8: Image.Transpose.ROTATE_90,
+}
+
+_COLOUR_MODES = {"1": "L", "L": "L", "LA": "L", "CMYK": "CMYK", "I": "I", "F": "F"}  # any other mode: RGB
+_STRAIGHT_MODES = {"La": "LA", "RGBa": "RGBA"}  # Pillow's premultiplied modes
+_CHANNELS = {1: [0, 0, 0], 2: [0, 0, 0, 1], 3: [0, 1, 2], 4: [0, 1, 2, 3]}  # grey, grey + alpha, RGB, RGBA
+
+
+@dataclass(frozen=True, eq=False)
+class Picture:
+    """A picture ready to be fitted, with what a user should know about how it was read."""
+
+    pixels: Floats  # [H, W, 3] opaque or [H, W, 4] straight alpha; sRGB-coded, 0..1
+    notes: tuple[str, ...] = ()
+
+    @property
+    def width(self) -> int:
+        """Pixels across."""
+        return int(self.pixels.shape[1])
+
+    @property
+    def height(self) -> int:
+        """Pixels down."""
+        return int(self.pixels.shape[0])
+
+    @property
+    def has_alpha(self) -> bool:
+        """Whether any pixel is less than fully opaque."""
+        return bool(self.pixels.shape[2] == 4)
+
+
+@functools.singledispatch
+def load(source: Any) -> Picture:
+    """Read a picture from a path, bytes, a binary file, a Pillow image or a numpy array.
+
+    Files: PNG, JPEG, WebP, AVIF, TIFF, GIF, BMP, of any colour model and depth that Pillow reads. The first
+    frame counts, EXIF orientation is applied, an embedded ICC profile is converted to sRGB (8 bits a channel;
+    relative colorimetric, black point compensated), and an alpha channel that is opaque all over is dropped.
+
+    Arrays: [H, W], [H, W, 1] grey, [H, W, 2] grey and straight alpha, [H, W, 3] RGB, [H, W, 4] straight RGBA;
+    bool, uint8, uint16, or floats 0..1. The array is copied.
+
+    Raises Sdf2vecError for anything that is no such picture, and for more than MAX_PIXELS pixels.
+    """
+    name = one_line(str(getattr(source, "name", "picture")))
+    try:
+        stream = io.BytesIO(source.read())
+    except AttributeError as error:
+        raise Sdf2vecError(
+            f"cannot read a picture from {type(source).__name__}; "
+            "give a path, bytes, a binary file, a Pillow image or a numpy array"
+        ) from error
+    except (TypeError, UnicodeDecodeError) as error:
+        raise Sdf2vecError(f"{name}: gives text, not bytes; open it in binary mode") from error
+    except OSError as error:
+        raise Sdf2vecError(f"{name}: cannot be read ({error.strerror or error})") from error
+    return _load_stream(stream, name)
+
+
+@load.register(bytes)
+@load.register(bytearray)
+@load.register(memoryview)
+def _(source: bytes | bytearray | memoryview) -> Picture:
+    return _load_stream(io.BytesIO(source), "picture")
+
+
+@load.register(str)
+@load.register(os.PathLike)
+def _(source: str | os.PathLike[str]) -> Picture:
+    path = os.fsdecode(source)
+    name = one_line(path)
+    with _opened_file(path, name) as stream:
+        # A pipe cannot be wound back, which Pillow needs.
+        return _load_stream(stream if stream.seekable() else io.BytesIO(stream.read()), name)
+
+
+@load.register(Image.Image)
+def _(source: Image.Image) -> Picture:
+    with _quiet_pillow():
+        return _from_image(source, one_line(os.path.basename(getattr(source, "filename", "")) or "picture"))
+
+
+@load.register(np.ndarray)
+def _(source: NDArray[Any]) -> Picture:
+    values = source[..., np.newaxis] if source.ndim == 2 else source
+    if values.ndim != 3 or values.shape[2] not in _CHANNELS:
+        shape = " × ".join(map(str, source.shape))
+        raise Sdf2vecError(f"array: shape {shape}; a picture is [H, W] or [H, W, C] with C = 1, 2, 3 or 4")
+    _check_size(values.shape[1], values.shape[0], "array")
+    return Picture(_without_opaque_alpha(_unit(values, "array")[..., _CHANNELS[values.shape[2]]]))
+
+
+def _opened_file(path: str, name: str) -> BinaryIO:
+    try:
+        return open(path, "rb")
+    except FileNotFoundError as error:
+        raise Sdf2vecError(f"{name}: no such file") from error
+    except IsADirectoryError as error:
+        raise Sdf2vecError(f"{name}: is a folder, not a picture") from error
+    except PermissionError as error:
+        raise Sdf2vecError(f"{name}: no permission to read it") from error
+    except (OSError, ValueError) as error:  # ValueError: a NUL character in the path
+        raise Sdf2vecError(f"{name}: cannot be read ({getattr(error, 'strerror', None) or error})") from error
+
+
+_pillow_lock = threading.RLock()
+
+
+@contextmanager
+def _quiet_pillow() -> Iterator[None]:
+    """Pillow without its warnings and its own size limit, in place of which `_check_size` stands."""
+    with _pillow_lock, warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        limit = Image.MAX_IMAGE_PIXELS
+        Image.MAX_IMAGE_PIXELS = None
+        try:
+            yield
+        finally:
+            Image.MAX_IMAGE_PIXELS = limit
+
+
+def _load_stream(stream: BinaryIO, name: str) -> Picture:
+    with _quiet_pillow(), _opened_image(stream, name) as image:
+        return _from_image(image, name)
+
+
+def _opened_image(stream: BinaryIO, name: str) -> Image.Image:
+    """The picture with its header read. Pillow's parsers raise nearly every exception on damaged files."""
+    try:
+        return Image.open(stream, formats=_FORMATS)
+    except Exception as error:
+        raise Sdf2vecError(f"{name}: {_not_opened(stream)}") from error
+
+
+def _not_opened(stream: BinaryIO) -> str:
+    stream.seek(0)
+    start = stream.read(16)
+    if not start:
+        return "empty file (0 bytes); re-save or re-download it"
+    if any(accepts(start) for _, accepts in map(Image.OPEN.__getitem__, _FORMATS) if accepts):
+        return "truncated or damaged file (its header cannot be read); re-save or re-download it"
+    return f"not a picture that can be read; give one of {_READABLE}"
+
+
+def _from_image(image: Image.Image, name: str) -> Picture:
+    _check_size(image.width, image.height, name)
+    upright = _upright(_decoded(image, name))
+    colour, alpha = _split_alpha(upright)
+    colour, colour_notes = _in_srgb(colour, upright.info.get("icc_profile"))
+    values, scale_notes = _samples(colour, name)
+    pixels = _unit(values, name)[..., _CHANNELS[values.shape[2]]]
+    if alpha is not None:
+        pixels = np.concatenate([pixels, np.asarray(alpha, np.float32)[..., np.newaxis] / 255], axis=2)
+    notes = (*_frame_notes(image), *colour_notes, *scale_notes)
+    return Picture(_without_opaque_alpha(pixels), tuple(f"{name}: {note}" for note in notes))
+
+
+def _check_size(width: int, height: int, name: str) -> None:
+    if min(width, height) < 1:
+        raise Sdf2vecError(f"{name}: has no pixels ({width} × {height})")
+    if width * height > MAX_PIXELS:
+        limit = MAX_PIXELS // 10**6
+        raise Sdf2vecError(f"{name}: {width} × {height} is more than {limit} megapixels; shrink it first")
+
+
+def _decoded(image: Image.Image, name: str) -> Image.Image:
+    try:
+        image.load()
+    except MemoryError as error:
+        raise Sdf2vecError(f"{name}: {image.width} × {image.height} pixels do not fit in memory") from error
+    except Exception as error:  # see `_opened_image`
+        reason = one_line(str(error))
+        kind = "truncated" if "truncated" in reason.lower() else "damaged"
+        raise Sdf2vecError(f"{name}: {kind} file ({reason}); re-save or re-download it") from error
+    return image
+
+
+def _upright(image: Image.Image) -> Image.Image:
+    try:
+        turn = _UPRIGHT.get(image.getexif().get(_ORIENTATION_TAG, 1))
+    except Exception:  # damaged EXIF data says nothing about the pixels
+        return image
+    return image if turn is None else image.transpose(turn)
+
+
+def _frame_notes(image: Image.Image) -> tuple[str, ...]:
+    if not getattr(image, "is_animated", False):
+        return ()
+    try:
+        return (f"{getattr(image, 'n_frames', 1)} frames, first one used",)
+    except Exception:  # counting reads later frames, which may be damaged where the first is not
+        return ("several frames, first one used",)
+
+
+def _split_alpha(image: Image.Image) -> tuple[Image.Image, Image.Image | None]:
+    """Colour in one of the modes L, I;16, I, F, RGB, CMYK, and alpha in mode L where there is any."""
+    if image.mode.startswith("I;16"):
+        return image, _keyed_alpha(image)
+    if image.mode == "LAB":
+        to_srgb = ImageCms.buildTransform(_lab_profile(), _srgb_profile(), "LAB", "RGB")
+        return _applied(image, to_srgb), None
+    image = image.convert(_STRAIGHT_MODES.get(image.mode, image.mode))
+    mode = _COLOUR_MODES.get(image.mode, "RGB")
+    if mode not in ("L", "RGB") or not image.has_transparency_data:
+        return image.convert(mode), None
+    with_alpha = _with_eight_bit_key(image).convert(mode + "A")
+    return with_alpha.convert(mode), with_alpha.getchannel("A")
+
+
+def _keyed_alpha(image: Image.Image) -> Image.Image | None:
+    """Alpha of a 16-bit grey PNG with one transparent level, which Pillow's conversions leave out."""
+    key = image.info.get("transparency")
+    if key is None:
+        return None
+    return Image.fromarray(np.where(np.asarray(image) == key, 0, 255).astype(np.uint8))
+
+
+def _with_eight_bit_key(image: Image.Image) -> Image.Image:
+    """Pillow cuts 16-bit RGB to its high bytes and leaves the transparent colour at 16 bits: cut it too."""
+    if image.mode != "RGB" or max(image.info["transparency"]) <= 255:
+        return image
+    image = image.copy()
+    image.info["transparency"] = tuple(level >> 8 for level in image.info["transparency"])
+    return image
+
+
+@functools.cache
+def _srgb_profile() -> ImageCms.ImageCmsProfile:
+    return ImageCms.ImageCmsProfile(ImageCms.createProfile("sRGB"))
+
+
+@functools.cache
+def _lab_profile() -> ImageCms.ImageCmsProfile:
+    return ImageCms.ImageCmsProfile(ImageCms.createProfile("LAB"))
+
+
+def _applied(image: Image.Image, transform: ImageCms.ImageCmsTransform) -> Image.Image:
+    converted = ImageCms.applyTransform(image, transform)
+    assert converted is not None  # it is None only for a transform in place
+    return converted
+
+
+def _in_srgb(colour: Image.Image, profile_bytes: bytes | None) -> tuple[Image.Image, tuple[str, ...]]:
+    """`colour` converted from its embedded ICC profile to sRGB, and remarks about that."""
+    if not profile_bytes:
+        return colour, ("CMYK without a colour profile, colours are approximate",) * (colour.mode == "CMYK")
+    try:
+        profile = ImageCms.ImageCmsProfile(io.BytesIO(profile_bytes))
+        description = one_line(ImageCms.getProfileDescription(profile).strip())
+        converted = _converted(colour, profile)
+    except (ImageCms.PyCMSError, ImportError, OSError, TypeError, ValueError):
+        return colour, ("embedded colour profile cannot be used, colours taken as sRGB",)
+    if colour.mode in ("L", "RGB") and _largest_difference(colour.convert("RGB"), converted) <= 1:
+        return colour, ()  # an sRGB profile: its round trip would only add rounding
+    return converted, (f"converted from its colour profile ({description}) to sRGB",)
+
+
+def _converted(colour: Image.Image, profile: ImageCms.ImageCmsProfile) -> Image.Image:
+    for_rgb = profile.profile.xcolor_space.strip() == "RGB"  # on grey files too, though it should not be
+    source = colour.convert("RGB") if for_rgb and colour.mode == "L" else colour
+    transform = ImageCms.buildTransform(
+        profile,
+        _srgb_profile(),
+        source.mode,
+        "RGB",
+        ImageCms.Intent.RELATIVE_COLORIMETRIC,
+        ImageCms.Flags.BLACKPOINTCOMPENSATION,
+    )
+    return _applied(source, transform)
+
+
+def _largest_difference(a: Image.Image, b: Image.Image) -> int:
+    """Over all bands, in 8-bit levels; both RGB."""
+    return int(np.asarray(ImageChops.difference(a, b)).max())
+
+
+def _samples(colour: Image.Image, name: str) -> tuple[NDArray[Any], tuple[str, ...]]:
+    """[H, W, 1 or 3] in a scale that `_unit` knows; Pillow leaves that of its 32-bit modes open."""
+    values = np.asarray(colour.convert("RGB") if colour.mode == "CMYK" else colour)
+    notes: tuple[str, ...] = ()
+    if colour.mode == "I":
+        values = _as_sixteen_bits(values, name)
+    elif colour.mode == "F" and 1 + _RANGE_SLACK < values.max() <= 255:
+        values, notes = values / 255, ("floats above 1, read as 0..255",)
+    return values.reshape(*values.shape[:2], -1), notes
+
+
+def _as_sixteen_bits(values: NDArray[Any], name: str) -> NDArray[np.uint16]:
+    if values.min() < 0 or values.max() > 65535:
+        raise Sdf2vecError(f"{name}: 32-bit integer samples; save it with 8 or 16 bits a channel")
+    return values.astype(np.uint16)
+
+
+def _unit(values: NDArray[Any], name: str) -> Floats:
+    """A new array of the same shape, 0..1."""
+    full_scale = _FULL_SCALE.get(values.dtype.name)
+    if full_scale:
+        unit = values.astype(np.float32)
+        unit /= full_scale
+        return unit
+    if values.dtype.kind != "f":
+        raise Sdf2vecError(f"{name}: {values.dtype} samples; use bool, uint8, uint16, or floats in 0..1")
+    if not np.isfinite(values).all():
+        raise Sdf2vecError(f"{name}: holds NaN or infinity; floats must lie in 0..1")
+    low, high = values.min(), values.max()
+    if low < -_RANGE_SLACK or high > 1 + _RANGE_SLACK:
+        raise Sdf2vecError(f"{name}: values from {low:.6g} to {high:.6g}; floats must lie in 0..1")
+    unit = values.astype(np.float32)
+    return np.clip(unit, 0, 1, out=unit)
+
+
+def _without_opaque_alpha(pixels: Floats) -> Floats:
+    opaque = pixels.shape[2] == 4 and pixels[..., 3].min() >= 1
+    return np.ascontiguousarray(pixels[..., :3] if opaque else pixels)
+
+
+def premultiply(pixels: Floats) -> Floats:
+    """Straight to premultiplied alpha: colour times alpha. [H, W, 4], a new array."""
+    return np.concatenate([pixels[..., :3] * pixels[..., 3:], pixels[..., 3:]], axis=2)
+
+
+def unpremultiply(pixels: Floats) -> Floats:
+    """Premultiplied to straight alpha: colour over alpha, black where alpha is 0. [H, W, 4], a new array."""
+    alpha = pixels[..., 3:]
+    colour = np.divide(pixels[..., :3], alpha, out=np.zeros_like(pixels[..., :3]), where=alpha > 0)
+    return np.concatenate([colour, alpha], axis=2)
+
+
+def resize(pixels: Floats, width: int, height: int) -> Floats:
+    """Resample [H, W, 3 or 4] (straight, 0..1) to [height, width, 3 or 4], clipped to 0..1.
+
+    Both pictures cover the same rectangle and pixel centres are at half-integers, so nothing shifts.
+    Shrinking weighs all pixels that a new one covers (Pillow's HAMMING filter); enlarging is bicubic.
+    Alpha is resampled premultiplied, so that colours of invisible pixels do not bleed.
+    """
+    has_alpha = pixels.shape[2] == 4
+    source = premultiply(pixels) if has_alpha else pixels
+    shrinks = width <= source.shape[1] and height <= source.shape[0]
+    method = Image.Resampling.HAMMING if shrinks else Image.Resampling.BICUBIC
+    planes = [_resized_plane(source[..., c], width, height, method) for c in range(source.shape[2])]
+    result = np.clip(np.stack(planes, axis=2), 0, 1)
+    # Bicubic overshoot may carry a colour past its alpha, hence the second clip.
+    return np.clip(unpremultiply(result), 0, 1) if has_alpha else result
+
+
+def _resized_plane(plane: Floats, width: int, height: int, method: Image.Resampling) -> Floats:
+    image = Image.fromarray(np.ascontiguousarray(plane, np.float32))  # [H, W], Pillow's mode F
+    return np.asarray(image.resize((width, height), method))
+
+
+def fitted_size(width: int, height: int, shortest: int) -> tuple[int, int]:
+    """(width, height) in pixels, of the same aspect but for rounding, with that shortest side. All >= 1."""
+    side = min(width, height)
+    return max(1, round(width * shortest / side)), max(1, round(height * shortest / side))
+
+
+def encode_png(pixels: NDArray[np.floating[Any]]) -> bytes:
+    """An 8-bit PNG of [H, W, 3] or straight [H, W, 4], sRGB-coded 0..1; clipped, rounded to nearest.
+
+    Raises Sdf2vecError for NaN.
+    """
+    if np.isnan(pixels).any():
+        raise Sdf2vecError("the picture to write holds NaN")
+    levels = np.rint(np.clip(pixels, 0, 1) * 255).astype(np.uint8)
+    stream = io.BytesIO()
+    Image.fromarray(levels).save(stream, "PNG")
+    return stream.getvalue()

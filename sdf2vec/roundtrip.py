@@ -1,0 +1,165 @@
+"""Round trips: exports re-rendered on real engines and compared with the torch render."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .engines import ENGINES, EngineError
+from .errors import Sdf2vecError
+from .export import export
+from .export.options import Options
+from .image import fitted_size, premultiply
+from .render.reference import render
+from .scene import Scene
+
+Pixels = NDArray[np.float32]  # [height, width, 4] premultiplied RGBA
+Size = tuple[int, int]
+
+SAME = 0.25  # largest error, in 8-bit levels, of an export that is the same picture
+CLOSE = 40.0  # dB
+LARGEST_FITTED = 512  # shortest side at which the fitted size is checked
+
+
+@dataclass(frozen=True)
+class Check:
+    """One export on one engine at one size, or `missing`: why it could not be checked.
+
+    Errors are in 8-bit levels over all pixels and RGBA; `mean_error` is signed.
+    """
+
+    target: str
+    engine: str
+    width: int = 0
+    height: int = 0
+    psnr: float = math.nan
+    largest_error: float = math.nan
+    mean_error: float = math.nan
+    missing: str = ""
+
+    @property
+    def verdict(self) -> str:
+        if self.missing:
+            return "not checked"
+        if self.largest_error <= SAME:
+            return "same"
+        return "close" if self.psnr >= CLOSE else "differs"
+
+
+@dataclass(frozen=True)
+class RoundTrip:
+    """How a target is drawn: on which engine, with what around the text.
+
+    A shader fills a canvas of any shape; a drawing (`any_shape=False`) ends at the edges of its picture.
+    """
+
+    target: str
+    engine: str
+    draw: Callable[[str, int, int], Pixels]
+    any_shape: bool = True
+
+
+def check(
+    scene: Scene, targets: Iterable[str] | None = None, sizes: Sequence[Size] | None = None
+) -> list[Check]:
+    """Re-renders the exports on every engine that is present. Sizes are (width, height) in pixels.
+
+    Without sizes: the fitted one (at most 512 on the shortest side), a larger one of another shape, a tiny one.
+    Raises Sdf2vecError when no engine can draw any of the targets.
+    """
+    chosen = set(ROUND_TRIPS) if targets is None else set(targets)
+    trips = [trip for name, trip in ROUND_TRIPS.items() if name in chosen]
+    if not trips:
+        raise Sdf2vecError(f"nothing to check: engines draw {', '.join(ROUND_TRIPS)}")
+    return [
+        result for trip in trips for result in _check_trip(scene, trip, sizes or default_sizes(scene, trip))
+    ]
+
+
+def default_sizes(scene: Scene, trip: RoundTrip) -> list[Size]:
+    """The fitted size, a larger one (of another shape, where that makes sense), a tiny one."""
+    shortest = min(LARGEST_FITTED, scene.width, scene.height)
+    width, height = fitted_size(scene.width, scene.height, shortest)
+    if trip.any_shape:
+        return [(width, height), (width * 5 // 4 + 1, height * 11 // 10 + 2), (19, 13)]
+    return [fitted_size(scene.width, scene.height, side) for side in (shortest, shortest * 5 // 4 + 1, 24)]
+
+
+def _check_trip(scene: Scene, trip: RoundTrip, sizes: Sequence[Size]) -> list[Check]:
+    reason = ENGINES[trip.engine].missing()
+    if reason:
+        return [Check(trip.target, trip.engine, missing=reason)]
+    try:
+        text = export(scene, trip.target, Options())
+        assert isinstance(text, str)
+        return [compare(trip, text, scene, size) for size in sizes]
+    except EngineError:
+        raise
+    except Sdf2vecError as error:
+        return [Check(trip.target, trip.engine, missing=str(error))]
+
+
+def compare(trip: RoundTrip, text: str, scene: Scene, size: Size) -> Check:
+    """One export drawn at one size, against the torch render in float64."""
+    import torch
+
+    width, height = size
+    drawn = trip.draw(text, width, height)
+    expected = render(scene, width, height, dtype=torch.float64).permute(1, 2, 0).numpy()
+    difference = 255.0 * (drawn.astype(np.float64) - expected)
+    error = float(np.mean(difference**2))
+    return Check(
+        trip.target,
+        trip.engine,
+        width,
+        height,
+        psnr=10.0 * math.log10(255.0**2 / error) if error > 0 else math.inf,
+        largest_error=float(np.abs(difference).max()),
+        mean_error=float(difference.mean()),
+    )
+
+
+# --- drawing -----------------------------------------------------------------------------------------------
+
+
+def _draw_glsl(text: str, width: int, height: int) -> Pixels:
+    return ENGINES["opengl"].render(text, width, height, uniforms={"resolution": (width, height)})
+
+
+def _draw_shadertoy(text: str, width: int, height: int) -> Pixels:
+    whole = SHADERTOY_HEAD + text + SHADERTOY_TAIL
+    return ENGINES["opengl"].render(whole, width, height, uniforms={"iResolution": (width, height, 1.0)})
+
+
+def _draw_wgsl(text: str, width: int, height: int) -> Pixels:
+    return ENGINES["webgpu"].render(text, width, height, uniforms={"resolution": (width, height)})
+
+
+def _draw_svg(text: str, width: int, height: int) -> Pixels:
+    return premultiply(ENGINES["resvg"].render(text, width, height))
+
+
+# What Shadertoy puts around a pasted text.
+SHADERTOY_HEAD = """#version 300 es
+precision highp float;
+precision highp int;
+uniform vec3 iResolution;
+out vec4 shadertoy_out_color;
+"""
+SHADERTOY_TAIL = """
+void main() { mainImage(shadertoy_out_color, gl_FragCoord.xy); }
+"""
+
+ROUND_TRIPS = {
+    trip.target: trip
+    for trip in (
+        RoundTrip("glsl", "opengl", _draw_glsl),
+        RoundTrip("shadertoy", "opengl", _draw_shadertoy),
+        RoundTrip("wgsl", "webgpu", _draw_wgsl),
+        RoundTrip("svg", "resvg", _draw_svg, any_shape=False),
+    )
+}

@@ -1,0 +1,28 @@
+"""Fixtures that all tests share."""
+
+import os
+from collections.abc import Callable
+
+import pytest
+
+from sdf2vec.engines import ENGINES, glslang
+
+MISSING = {name: engine.missing for name, engine in ENGINES.items()} | {"glslang": glslang.missing}
+
+
+@pytest.fixture
+def require_engine() -> Callable[[str], None]:
+    """A function that lets a test go on only where the named engine works.
+
+    It skips on a user's machine and fails where the environment variable CI says that nothing may be missing.
+    """
+    return _require_engine
+
+
+def _require_engine(name: str) -> None:
+    reason = MISSING[name]()
+    if reason is None:
+        return
+    if os.environ.get("CI", "").lower() not in ("", "0", "false", "no"):
+        pytest.fail(f"{name}: {reason}")
+    pytest.skip(f"{name}: {reason}")
