@@ -183,10 +183,12 @@ PRECEDENCE = {"?": 1, "<": 3, "+": 5, "-": 5, "*": 6, "/": 6, "unary": 8}
 
 @dataclass(frozen=True)
 class Cell:
-    """How a shader language spells an operation: a format text and how tightly it binds."""
+    """How a shader language spells an operation: a format text, how tightly it binds, and how tightly its
+    operands must bind (as tightly as itself, when not said)."""
 
     text: str
     precedence: int = CALL
+    operands: int = 0
 
 
 @dataclass(frozen=True)
@@ -302,7 +304,7 @@ def _vector(width: int) -> Operation:
     )
 
 
-_SIGMOID = Cell("1.0 / (1.0 + exp(min(-{0}, 80.0)))", PRECEDENCE["/"])
+_SIGMOID = Cell("1.0 / (1.0 + exp(min(-{0}, 80.0)))", PRECEDENCE["/"], operands=CALL)
 _SQRT = "torch.where({0} > 0, torch.sqrt(torch.where({0} > 0, {0}, 1.0)), 0.0)"
 
 # Ties: min and max return (and pass the gradient to) their second argument, abs counts 0 as positive.
@@ -483,6 +485,9 @@ def _simple_neg(a: Expr) -> Expr | None:
 
 
 def _simple_select(condition: Expr, a: Expr, b: Expr) -> Expr | None:
+    if condition.op == "less" and all(arg.op == "const" for arg in condition.args):
+        left, right = map(constant, condition.args)
+        return a if left < right else b
     return a if a is b else None
 
 

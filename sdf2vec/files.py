@@ -30,8 +30,6 @@ def write_atomically(path: str | os.PathLike[str], data: bytes) -> None:
     """
     try:
         target = Path(os.path.realpath(path))
-        if target.is_dir():
-            raise IsADirectoryError
         if target.exists() and not target.is_file():
             target.write_bytes(data)
         else:

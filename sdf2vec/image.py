@@ -116,7 +116,7 @@ def _(source: str | os.PathLike[str]) -> Picture:
     path = os.fsdecode(source)
     name = one_line(path)
     with _opened_file(path, name) as stream:
-        # A pipe cannot be wound back, which Pillow needs.
+        # A pipe cannot be wound back, which naming what is wrong with it needs.
         return _load_stream(stream if stream.seekable() else io.BytesIO(stream.read()), name)
 
 
@@ -242,9 +242,6 @@ def _split_alpha(image: Image.Image) -> tuple[Image.Image, Image.Image | None]:
     """Colour in one of the modes L, I;16, I, F, RGB, CMYK, and alpha in mode L where there is any."""
     if image.mode.startswith("I;16"):
         return image, _keyed_alpha(image)
-    if image.mode == "LAB":
-        to_srgb = ImageCms.buildTransform(_lab_profile(), _srgb_profile(), "LAB", "RGB")
-        return _applied(image, to_srgb), None
     image = image.convert(_STRAIGHT_MODES.get(image.mode, image.mode))
     mode = _COLOUR_MODES.get(image.mode, "RGB")
     if mode not in ("L", "RGB") or not image.has_transparency_data:
@@ -275,17 +272,6 @@ def _srgb_profile() -> ImageCms.ImageCmsProfile:
     return ImageCms.ImageCmsProfile(ImageCms.createProfile("sRGB"))
 
 
-@functools.cache
-def _lab_profile() -> ImageCms.ImageCmsProfile:
-    return ImageCms.ImageCmsProfile(ImageCms.createProfile("LAB"))
-
-
-def _applied(image: Image.Image, transform: ImageCms.ImageCmsTransform) -> Image.Image:
-    converted = ImageCms.applyTransform(image, transform)
-    assert converted is not None  # it is None only for a transform in place
-    return converted
-
-
 def _in_srgb(colour: Image.Image, profile_bytes: bytes | None) -> tuple[Image.Image, tuple[str, ...]]:
     """`colour` converted from its embedded ICC profile to sRGB, and remarks about that."""
     if not profile_bytes:
@@ -312,7 +298,9 @@ def _converted(colour: Image.Image, profile: ImageCms.ImageCmsProfile) -> Image.
         ImageCms.Intent.RELATIVE_COLORIMETRIC,
         ImageCms.Flags.BLACKPOINTCOMPENSATION,
     )
-    return _applied(source, transform)
+    converted = ImageCms.applyTransform(source, transform)
+    assert converted is not None  # it is None only for a transform in place
+    return converted
 
 
 def _largest_difference(a: Image.Image, b: Image.Image) -> int:

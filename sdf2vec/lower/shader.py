@@ -167,7 +167,8 @@ def _print_operation(expr: Expr, dialect: Dialect, names: dict[Expr, str]) -> tu
     if cell.precedence == CALL:
         return cell.text.format(*(_print(arg, dialect, names)[0] for arg in expr.args)), CALL
     # an operand on the right of an operator binds tighter, so that the order of evaluation stays the graph's
-    parts = [_bound(arg, cell.precedence + (i > 0), dialect, names) for i, arg in enumerate(expr.args)]
+    needed = max(cell.precedence, cell.operands)
+    parts = [_bound(arg, needed + (i > 0), dialect, names) for i, arg in enumerate(expr.args)]
     return cell.text.format(*parts), cell.precedence
 
 
