@@ -9,6 +9,8 @@ from __future__ import annotations
 import json
 import math
 import os
+import reprlib
+from collections import Counter
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -17,7 +19,7 @@ from typing import Any
 
 from .blend import COMPOSITING
 from .errors import Sdf2vecError
-from .files import write_atomically
+from .files import one_line, write_atomically
 from .shapes import KINDS, LARGEST, Kind, Parameter
 
 FORMAT = "sdf2vec scene"
@@ -34,7 +36,7 @@ class SceneError(Sdf2vecError):
     """A malformed scene; `path` names the field, as in `layers[12].radius`."""
 
     def __init__(self, path: str, problem: str) -> None:
-        super().__init__(f"{path}: {problem}" if path else problem)
+        super().__init__(one_line(f"{path}: {problem}" if path else problem))
         self.path = path
         self.problem = problem
 
@@ -83,13 +85,29 @@ def _whole(value: Any, path: str, low: int, high: int) -> int:
     if isinstance(value, bool) or not isinstance(value, int):
         raise SceneError(path, f"must be a whole number, got {_shown(value)}")
     if not low <= value <= high:
-        raise SceneError(path, f"must be between {low} and {high}, got {value if value < 10**9 else 'more'}")
+        raise SceneError(path, f"must be between {low} and {high}, got {_shown(value)}")
     return value
 
 
 def _shown(value: Any) -> str:
-    text = repr(value)
+    text = _REPR.repr(value)
     return text if len(text) <= 40 else f"{text[:37]}..."
+
+
+class _Repr(reprlib.Repr):
+    """Short, and safe, whatever a file holds: a million numbers, a number of a thousand digits, deep nests."""
+
+    def repr1(self, x: Any, level: int) -> str:
+        return super().repr1(dict(x) if isinstance(x, dict) else x, level)
+
+
+_REPR = _Repr()
+_REPR.maxlevel = 3
+
+
+def _field(name: str) -> str:
+    """A field's name, of which a file may make anything, as part of a path."""
+    return name if name.isidentifier() and len(name) <= 40 else _shown(name)
 
 
 def _in_range(parameter: Parameter, value: float, path: str) -> None:
@@ -160,8 +178,9 @@ class Layer:
     def __post_init__(self) -> None:
         if not self.shapes:
             raise SceneError("union", "must hold at least 1 shape, got 0")
-        if len({shape.kind for shape in self.shapes}) > 1:
-            raise SceneError("union", f"shapes must be of one kind, got {[s.kind for s in self.shapes]}")
+        kinds = dict.fromkeys(shape.kind for shape in self.shapes)
+        if len(kinds) > 1:
+            raise SceneError("union", f"shapes must be of one kind, got {' and '.join(kinds)}")
         object.__setattr__(self, "falloff", _between(self.falloff, "falloff", 0.0, LARGEST))
         object.__setattr__(self, "opacity", _between(self.opacity, "opacity", -1.0, 1.0, COLOR_DECIMALS))
         object.__setattr__(self, "smoothness", self._checked_smoothness())
@@ -197,10 +216,7 @@ class Scene:
     def __post_init__(self) -> None:
         _whole(self.width, "width", 1, MAX_SIDE)
         _whole(self.height, "height", 1, MAX_SIDE)
-        if self.compositing not in COMPOSITING:
-            raise SceneError(
-                "compositing", f"must be one of {_listed(COMPOSITING)}, got {_shown(self.compositing)}"
-            )
+        _one_of(self.compositing, "compositing", COMPOSITING)
         if self.background is not None:
             background = _color(self.background, "background")
             _check_color(background, "background", 0.0)
@@ -224,8 +240,9 @@ class Scene:
     def to(self, target: str, **options: Any) -> str | bytes:
         """The scene exported, as in `scene.to("glsl")`; see `sdf2vec.export`."""
         from .export import export
+        from .export.options import Options
 
-        return export(self, target, **options)
+        return export(self, target, Options(**options))
 
 
 def _check_color(color: Color, path: str, lowest: float) -> None:
@@ -281,7 +298,7 @@ def _flatten(kind: Kind, parameters: Mapping[str, Any]) -> tuple[float, ...]:
             raise SceneError(parameter.name, f"must be a list of {count} numbers, got {_shown(value)}")
     for name in parameters:
         if name not in names:
-            raise SceneError(name, f"unknown; a {kind.name} has {_listed(names)}")
+            raise SceneError(_field(name), f"unknown; a {kind.name} has {_listed(names)}")
     return tuple(flat)
 
 
@@ -340,10 +357,10 @@ def _short(value: Any) -> Any:
 
 def loads(text: str | bytes) -> Scene:
     """A scene from JSON text. Raises SceneError, whose one line names the offending field."""
-    data = _object(_parse(text), "")
+    data = _object(_parse(text))
     if data.get("format") != FORMAT:
-        raise SceneError("format", f"must be {FORMAT!r}, got {_shown(data.get('format'))}: not a scene file")
-    if data.get("version") != VERSION:
+        raise SceneError("format", f"must be {FORMAT!r}, got {_shown(data.get('format'))}; not a scene file")
+    if data.get("version") != VERSION or isinstance(data["version"], bool):
         raise SceneError(
             "version", f"this program reads version {VERSION}, got {_shown(data.get('version'))}"
         )
@@ -367,22 +384,18 @@ def load(path: str | os.PathLike[str]) -> Scene:
     """A scene from a JSON file. Raises Sdf2vecError, whose one line names the file and the field."""
     try:
         text = Path(path).read_bytes()
-    except OSError as error:
-        raise Sdf2vecError(f"{path}: cannot read the scene ({error.strerror})") from None
+    except (OSError, ValueError) as error:  # ValueError: a NUL character in the path
+        reason = getattr(error, "strerror", None) or error
+        raise Sdf2vecError(f"{one_line(str(path))}: cannot read the scene ({reason})") from None
     try:
         return loads(text)
     except SceneError as error:
-        raise Sdf2vecError(f"{path}: {error}") from None
+        raise Sdf2vecError(f"{one_line(str(path))}: {error}") from None
 
 
 def _parse(text: str | bytes) -> Any:
-    def refuse(name: str) -> float:
-        raise SceneError("", f"{name} is not a number that a scene can hold")
-
     try:
-        return json.loads(text, parse_constant=refuse, object_pairs_hook=_unique)
-    except SceneError:
-        raise
+        return json.loads(text, parse_int=_integer, object_pairs_hook=_Object)
     except json.JSONDecodeError as error:
         raise SceneError(
             "", f"not valid JSON: {error.msg} at line {error.lineno}, column {error.colno}"
@@ -391,17 +404,21 @@ def _parse(text: str | bytes) -> Any:
         raise SceneError("", "not valid JSON: not UTF-8 text") from None
     except RecursionError:
         raise SceneError("", "not a scene: nested too deeply") from None
-    except ValueError:
-        raise SceneError("", "not valid JSON: a number has too many digits") from None
 
 
-def _unique(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
-    seen: dict[str, Any] = {}
-    for key, value in pairs:
-        if key in seen:
-            raise SceneError("", f"the field {_shown(key)} appears twice in one object")
-        seen[key] = value
-    return seen
+class _Object(dict[str, Any]):
+    """A JSON object that knows which of its fields, if any, appeared more than once."""
+
+    def __init__(self, pairs: list[tuple[str, Any]]) -> None:
+        super().__init__(pairs)
+        self.repeated: str | None = None
+        if len(self) < len(pairs):
+            self.repeated = Counter(name for name, _ in pairs).most_common(1)[0][0]
+
+
+def _integer(digits: str) -> int | float:
+    """Python refuses to read thousands of digits; the field's own check then refuses infinity."""
+    return int(digits) if len(digits) <= 400 else math.copysign(math.inf, -1 if digits[0] == "-" else 1)
 
 
 def _numbered(items: list[Any], path: str, read: Callable[[Any], Any]) -> Iterator[Any]:
@@ -410,9 +427,11 @@ def _numbered(items: list[Any], path: str, read: Callable[[Any], Any]) -> Iterat
             yield read(item)
 
 
-def _object(value: Any, path: str) -> dict[str, Any]:
-    if not isinstance(value, dict):
-        raise SceneError(path, f"must be an object, got {_shown(value)}")
+def _object(value: Any) -> _Object:
+    if not isinstance(value, _Object):
+        raise SceneError("", f"must be an object, got {_shown(value)}")
+    if value.repeated is not None:
+        raise SceneError(_field(value.repeated), "appears twice in one object")
     return value
 
 
@@ -425,16 +444,16 @@ def _required(data: dict[str, Any], name: str) -> Any:
 def _refuse_unknown(data: dict[str, Any], known: set[str]) -> None:
     for name in data:
         if name not in known:
-            raise SceneError(name, f"unknown field; known are {_listed(sorted(known))}")
+            raise SceneError(_field(name), f"unknown field; known are {_listed(sorted(known))}")
 
 
 def _read_layer(value: Any) -> Layer:
-    data = _object(value, "")
+    data = _object(value)
     outer = {name: data[name] for name in ("falloff", "opacity", "smoothness") if name in data}
     falloff = _required(data, "falloff")
     if "union" not in data:
         outer.pop("smoothness", None)
-        shapes: tuple[Shape, ...] = (_read_shape({k: v for k, v in data.items() if k not in outer}),)
+        shapes: tuple[Shape, ...] = (_shape({k: v for k, v in data.items() if k not in outer}),)
     else:
         _refuse_unknown(data, {"union", "falloff", "opacity", "smoothness"})
         if not isinstance(data["union"], list):
@@ -444,7 +463,10 @@ def _read_layer(value: Any) -> Layer:
 
 
 def _read_shape(value: Any) -> Shape:
-    data = dict(_object(value, ""))
+    return _shape(_object(value))
+
+
+def _shape(data: dict[str, Any]) -> Shape:
     kind = _kind(_required(data, "kind"))
     color = _required(data, "color")
     parameters = {name: item for name, item in data.items() if name not in ("kind", "color")}

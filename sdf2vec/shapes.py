@@ -37,8 +37,9 @@ from .expr import (
 Point = tuple[float, float]
 Unit = Literal["position", "length", "angle", "frequency"]
 
-TINY = 1e-20  # keeps divisors away from 0 at zero size; far below any visible length, squared
-LARGEST = 64.0  # scene units; anything larger is a mistake
+SMALLEST = 1e-6  # scene units; keeps divisors away from 0 at zero size
+TINY = 1e-20  # the same for squared lengths
+LARGEST = 65536.0  # scene units: the longest canvas there can be; anything larger is a mistake
 
 
 # --- outlines: what a vector format draws for the contour `distance = offset` -------------------------------
@@ -189,7 +190,7 @@ def _circle_outline(offset: float, center: Point, radius: float) -> Outline:
 @function("sdEllipse", p=VEC2, radii=VEC2)
 def sd_ellipse(p: Expr, radii: Expr) -> Expr:
     """Field of a scaled circle: 0 on the ellipse, exact along the shorter axis, too small elsewhere."""
-    r = let("r", maximum(radii, TINY))
+    r = let("r", maximum(radii, SMALLEST))
     return (length(p / r) - 1.0) * _smaller_component(r)
 
 
@@ -198,7 +199,7 @@ def _ellipse_distance(p: Expr, center: Expr, radii: Expr, angle: Expr) -> Expr:
 
 
 def _ellipse_extent(margin: Expr, center: Expr, radii: Expr, angle: Expr) -> Expr:
-    r = maximum(radii, TINY)
+    r = maximum(radii, SMALLEST)
     grown = r + r * (margin / _smaller_component(r))
     along, across = _axis(angle) * grown.x, _axis(angle) * grown.y
     half = vec2(length(vec2(along.x, across.y)), length(vec2(along.y, across.x)))

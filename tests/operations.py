@@ -1,6 +1,6 @@
 """What every operation of the table means, written down a second time in numpy, and inputs that are hard."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -20,15 +20,15 @@ class Meaning:
     arity: int
     build: Callable[..., Expr]
     value: Callable[..., object]
-    cases: list[tuple[float, ...]]
+    cases: Sequence[tuple[float, ...]]
     kinks: bool = False
 
 
-def _pairs(values: list[float]) -> list[tuple[float, ...]]:
+def _pairs(values: Sequence[float]) -> Sequence[tuple[float, ...]]:
     return [(a, b) for a in values for b in values] + TIES
 
 
-def _singles(values: list[float]) -> list[tuple[float, ...]]:
+def _singles(values: Sequence[float]) -> list[tuple[float, ...]]:
     return [(a,) for a in values]
 
 

@@ -39,6 +39,12 @@ a, b, p = var("a"), var("b"), var("p", VEC2)
 ARGUMENTS = [var(name) for name in ("x0", "x1", "x2", "x3", "x4")]
 
 
+@function("double", x=FLOAT)
+def _double(x):
+    """Twice x."""
+    return x + x
+
+
 def test_equal_expressions_are_one_object():
     assert (a + b) * a is (a + b) * a
     assert a + b is not b + a
@@ -86,12 +92,6 @@ def test_constants_are_finite_and_zero_has_no_sign():
 def test_types_that_do_not_fit_are_refused(build):
     with pytest.raises(TypeError):
         build()
-
-
-@function("double", x=FLOAT)
-def _double(x):
-    """Twice x."""
-    return x + x
 
 
 def test_walk_gives_arguments_first_and_every_node_once():

@@ -8,7 +8,7 @@ from ..render.tensors import Group, SceneTensors
 from ..shapes import KINDS, Parameter
 
 MARGIN = 0.3  # scene units that a position may leave the canvas by
-LONGEST = 1.5  # scene units
+LONGEST = 1.5  # longest sides of the canvas
 HIGHEST_FREQUENCY = 60.0  # radians per scene unit
 FAINTEST = 0.02  # opacity under `over`: below it a shape would stop learning
 
@@ -31,7 +31,7 @@ def _project_parameter(
             for axis in (0, 1):
                 values[..., axis].clamp_(-size[axis] / 2 - MARGIN, size[axis] / 2 + MARGIN)
         case "length":
-            values.clamp_(pixel if parameter.positive else 0.0, LONGEST)
+            values.clamp_(pixel if parameter.positive else 0.0, LONGEST * max(size))
         case "frequency":
             values.clamp_(-HIGHEST_FREQUENCY, HIGHEST_FREQUENCY)
         case "angle":

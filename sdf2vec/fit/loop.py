@@ -16,7 +16,7 @@ from ..scene import Scene
 from .constraints import project
 from .losses import total_loss
 from .placing import place
-from .presets import DEFAULT, PRESETS, RATES, Loss, Phase
+from .presets import DEFAULT, LENGTHS, PRESETS, RATES, Loss, Phase
 
 
 @dataclass(frozen=True)
@@ -99,11 +99,12 @@ def _adam(tensors: SceneTensors) -> torch.optim.Adam:
             (name, tensor) for name, tensor in groups if name != "opacity" or tensors.compositing == "over"
         ]
         free.append(("background", tensors.background))
+    scale = math.sqrt(tensors.size[0] * tensors.size[1])  # of the canvas, and so of what lies on it
+    rates = (
+        RATES | {name: RATES[name] * scale for name in LENGTHS} | {"frequency": RATES["frequency"] / scale}
+    )
     return torch.optim.Adam(
-        [
-            {"params": [tensor.requires_grad_()], "lr": RATES[name], "base_rate": RATES[name]}
-            for name, tensor in free
-        ],
+        [{"params": [tensor.requires_grad_()], "lr": 0.0, "base_rate": rates[name]} for name, tensor in free],
         betas=(0.9, 0.99),
         eps=1e-12,
     )

@@ -13,6 +13,7 @@ from ..shapes import KINDS, Kind
 UNIFORM_SHARE = 0.35  # of the shapes goes anywhere, the rest where the picture changes
 CANDIDATES = 8  # positions tried for each shape; the one farthest from the others, in their sizes, is taken
 FALLOFF = 0.4  # of a shape's size
+LARGEST = 0.35  # size of a shape, for a canvas of area 1
 
 
 def place(
@@ -66,7 +67,11 @@ def _spread(
     x = ((picked % width + jitter[0]) / width - 0.5) * size[0]
     y = ((picked // width + jitter[1]) / height - 0.5) * size[1]
     area = size[0] * size[1] / density.numel()
-    room = (area / (density.flatten()[picked] * count * math.pi)).sqrt().clamp(max=0.35)
+    room = (
+        (area / (density.flatten()[picked] * count * math.pi))
+        .sqrt()
+        .clamp(max=LARGEST * math.sqrt(size[0] * size[1]))
+    )
     points = torch.stack([x, y], dim=1).reshape(count, CANDIDATES, 2)
     room = room.reshape(count, CANDIDATES)
     centers, sizes = points[:, 0].clone(), room[:, 0].clone()

@@ -43,7 +43,7 @@ PRESETS: dict[str, tuple[Phase, ...]] = {
 }
 DEFAULT = "balanced"
 
-# Learning rates per step, by what a tensor means (units as in `shapes.Parameter`).
+# Learning rates per step on a canvas of area 1, by what a tensor means (units as in `shapes.Parameter`).
 RATES = {
     "position": 0.005,
     "length": 0.003,
@@ -55,3 +55,4 @@ RATES = {
     "smoothness": 0.003,
     "background": 0.01,
 }
+LENGTHS = ("position", "length", "falloff", "smoothness")  # grow with the canvas

@@ -1,0 +1,122 @@
+"""How near a fit comes to its picture: PSNR, SSIM, FLIP, seconds. Writes a table in Markdown.
+
+    python -m sdf2vec.bench.quality examples/coffee.png --shapes 64 -o docs/quality.md
+
+FLIP is NVIDIA's own implementation (`flip-evaluator`, LDR, default viewing distance, mean).
+"""
+
+from __future__ import annotations
+
+import argparse
+import os
+import time
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+import torch
+
+from .. import api
+from ..files import write_atomically
+from ..image import Picture, load
+from ..metrics import psnr, ssim
+from ..render.reference import render
+from ..scene import Scene
+
+
+@dataclass(frozen=True)
+class Row:
+    """One fit and its measures; seconds are of wall time."""
+
+    picture: str
+    kind: str
+    compositing: str
+    shapes: int
+    psnr: float
+    ssim: float
+    flip: float
+    seconds: float
+
+
+def measure(path: Path, kind: str, compositing: str, shapes: int, preset: str, seed: int) -> Row:
+    """Fits one picture and compares the render at its full size, 8 bits a channel."""
+    picture = load(path)
+    started = time.perf_counter()
+    scene = api.fit(picture, shapes, kind=kind, compositing=compositing, preset=preset, seed=seed)
+    seconds = time.perf_counter() - started
+    drawn, target = _eight_bits(scene), _tensor(picture)
+    values = float(psnr(drawn, target)), float(ssim(drawn, target)), flip(drawn, target)
+    return Row(path.stem, kind, compositing, shapes, *values, seconds)
+
+
+def flip(drawn: torch.Tensor, target: torch.Tensor) -> float:
+    """Mean FLIP of two pictures [3, H, W]."""
+    import flip_evaluator
+
+    images = [np.ascontiguousarray(image.permute(1, 2, 0).float().numpy()) for image in (target, drawn)]
+    _, mean, _ = flip_evaluator.evaluate(*images, "LDR", applyMagma=False)
+    return float(mean)
+
+
+def _eight_bits(scene: Scene) -> torch.Tensor:
+    return (render(scene)[:3] * 255).round() / 255
+
+
+def _tensor(picture: Picture) -> torch.Tensor:
+    return torch.from_numpy(np.ascontiguousarray(picture.pixels[..., :3].transpose(2, 0, 1)))
+
+
+def table(rows: list[Row], command: str) -> str:
+    """The page."""
+    head = (
+        "# Quality of a fit",
+        "",
+        "Scored at the picture's full size against the original, 8 bits a channel. Seconds are wall time on "
+        f"{os.cpu_count()} CPU cores: compare them within one table only.",
+        "",
+        f"    {command}",
+        "",
+        "| picture | kind | compositing | shapes | PSNR dB | SSIM | FLIP | seconds |",
+        "|---|---|---|---:|---:|---:|---:|---:|",
+    )
+    body = (
+        f"| {r.picture} | {r.kind} | {r.compositing} | {r.shapes} "
+        f"| {r.psnr:.2f} | {r.ssim:.4f} | {r.flip:.4f} | {r.seconds:.1f} |"
+        for r in rows
+    )
+    return "\n".join([*head, *body]) + "\n"
+
+
+def _rows(options: argparse.Namespace) -> Iterator[Row]:
+    for path in options.pictures:
+        for kind in options.kinds.split(","):
+            for compositing in options.compositing.split(","):
+                for shapes in map(int, options.shapes.split(",")):
+                    row = measure(path, kind, compositing, shapes, options.preset, options.seed)
+                    print(row, flush=True)
+                    yield row
+
+
+def main() -> None:
+    """Entry point of `python -m sdf2vec.bench.quality`."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("pictures", nargs="+", type=Path)
+    parser.add_argument("--shapes", default="64", help="numbers, separated by commas")
+    parser.add_argument("--kinds", default="circle,ellipse,box,triangle,displaced,mixed")
+    parser.add_argument("--compositing", default="over,additive")
+    parser.add_argument("--preset", default="balanced")
+    parser.add_argument("--seed", type=int, default=0)
+    parser.add_argument("-o", "--output", type=Path, required=True)
+    options = parser.parse_args()
+    names = " ".join(path.name for path in options.pictures)
+    command = (
+        f"python -m sdf2vec.bench.quality {names} --shapes {options.shapes} --kinds {options.kinds} "
+        f"--compositing {options.compositing} --preset {options.preset} --seed {options.seed} "
+        f"-o {options.output.name}"
+    )
+    write_atomically(options.output, table(list(_rows(options)), command).encode())
+
+
+if __name__ == "__main__":
+    main()

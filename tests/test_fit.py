@@ -1,0 +1,149 @@
+"""The fit: it lowers its losses, keeps its promises, and is the same twice."""
+
+import math
+
+import numpy as np
+import pytest
+import torch
+
+import sdf2vec
+from sdf2vec.fit import constraints, losses
+from sdf2vec.fit.loop import Progress, Settings, fit_picture, scaled
+from sdf2vec.fit.placing import detail, place
+from sdf2vec.fit.presets import PRESETS, RATES
+from sdf2vec.image import Picture
+from sdf2vec.metrics import mse, psnr
+from sdf2vec.render.reference import render
+from sdf2vec.render.tensors import from_scene
+from sdf2vec.shapes import KINDS
+
+from .scenes import random_scene
+
+
+def picture(width=48, height=32, alpha=False):
+    """A soft disc on a gradient, drawn by numpy."""
+    y, x = np.mgrid[0:height, 0:width].astype(np.float32)
+    disc = 1 / (1 + np.exp(np.hypot(x - width * 0.6, y - height * 0.4) - height * 0.25))
+    pixels = np.stack([0.2 + 0.6 * disc, x / width * (1 - disc), 0.8 - 0.5 * disc], axis=2)
+    return Picture(np.dstack([pixels, disc]).astype(np.float32) if alpha else pixels.astype(np.float32))
+
+
+def as_tensor(pic):
+    pixels = pic.pixels.copy()
+    if pic.has_alpha:
+        pixels[..., :3] *= pixels[..., 3:]
+    return torch.from_numpy(pixels.transpose(2, 0, 1))
+
+
+@pytest.mark.parametrize("compositing", ["over", "additive"])
+@pytest.mark.parametrize("alpha", [False, True])
+def test_a_fit_is_near_the_picture(compositing, alpha):
+    pic = picture(alpha=alpha)
+    scene = fit_picture(pic, Settings(8, ("circle", "ellipse"), compositing, "fast"))
+    target = as_tensor(pic)
+    assert float(psnr(render(scene)[: len(target)], target)) > 25.0
+    assert (scene.background is None) == alpha
+    assert scene.shape_count == 8
+    assert (scene.width, scene.height) == (48, 32)
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_every_kind_fits(kind):
+    pic = picture()
+    scene = fit_picture(pic, Settings(6, (kind,), preset="fast"))
+    flat = as_tensor(pic).mean(dim=(1, 2), keepdim=True).expand(3, 32, 48)
+    assert float(mse(render(scene)[:3], as_tensor(pic))) < 0.25 * float(mse(flat, as_tensor(pic)))
+    assert {layer.kind for layer in scene.layers} == {kind}
+
+
+def remember(seen):
+    """A callback that keeps all progress and never stops."""
+
+    def callback(progress):
+        seen.append(progress)
+        return False
+
+    return callback
+
+
+@pytest.mark.parametrize("loss", losses.LOSSES)
+def test_every_loss_is_zero_when_equal_and_falls_in_a_fit(loss):
+    target = as_tensor(picture())
+    assert float(losses.LOSSES[loss](target, target)) == pytest.approx(0.0, abs=1e-6)
+    seen: list[Progress] = []
+    settings = Settings(6, ("circle",), preset="fast", loss=((loss, 1.0),))
+    fit_picture(picture(), settings, remember(seen))
+    coarse = [p.loss for p in seen if p.phase == "coarse"]
+    assert coarse[-1] < 0.5 * coarse[0]
+
+
+def test_the_same_seed_gives_the_same_scene_and_another_another():
+    scenes = [fit_picture(picture(), Settings(5, tuple(KINDS), preset="fast", seed=s)) for s in (1, 1, 2)]
+    assert scenes[0] == scenes[1] != scenes[2]
+
+
+def test_progress_and_stopping():
+    seen = []
+
+    def callback(progress):
+        seen.append(progress)
+        return progress.step == 7
+
+    scene = fit_picture(picture(), Settings(4, ("box",), preset="fast"), callback)
+    assert [p.step for p in seen] == list(range(1, 8))
+    assert {p.steps for p in seen} == {sum(phase.steps for phase in PRESETS["fast"])}
+    assert all(math.isfinite(p.loss) for p in seen)
+    assert scene.shape_count == 4
+
+
+@pytest.mark.parametrize("size", [(1, 1), (1, 500), (37, 2)])
+def test_odd_pictures(size):
+    pixels = np.full((size[1], size[0], 3), 0.4, dtype=np.float32)
+    scene = sdf2vec.fit(pixels, 3, preset="fast", kind="mixed")
+    assert float((render(scene)[:3] - 0.4).abs().max()) < 0.05
+
+
+def test_shapes_start_where_the_picture_has_detail():
+    pixels = torch.zeros(3, 64, 64)
+    pixels[:, :16, :16] = torch.rand(3, 16, 16, generator=torch.Generator().manual_seed(0))
+    density = detail(pixels)
+    assert float(density.sum()) == pytest.approx(1.0)
+    assert float(density[:17, :17].sum()) > 0.6
+    generator = torch.Generator().manual_seed(0)
+    tensors = place(pixels, (1.0, 1.0), ["circle"], 100, "over", generator)
+    centers = tensors.groups[0].parameters["center"][:, 0]
+    radii = tensors.groups[0].parameters["radius"][:, 0, 0]
+    corner = (centers < -0.25).all(dim=1)
+    assert int(corner.sum()) > 50
+    assert float(radii[corner].mean()) < 0.5 * float(radii[~corner].mean())
+    assert (radii[:-1] >= radii[1:]).all()  # large ones lie below
+
+
+def test_constraints_hold_after_anything():
+    for compositing in ("over", "additive"):
+        tensors = from_scene(random_scene(compositing=compositing, layers=20))
+        with torch.no_grad():
+            for group in tensors.groups:
+                for _, tensor in group.tensors():
+                    tensor.add_(torch.randn(tensor.shape, generator=torch.Generator().manual_seed(1)) * 200)
+        constraints.project(tensors, 0.01)
+        for group in tensors.groups:
+            for parameter in KINDS[group.kind].parameters:
+                values = group.parameters[parameter.name]
+                assert float(values.min()) >= parameter.minimum
+                assert float(values.max()) <= parameter.maximum
+                if parameter.positive:
+                    assert float(values.min()) >= 0.01 - 1e-6
+            assert float(group.opacity.abs().max()) <= 1.0
+            assert float(group.colors.min()) >= (-1.0 if compositing == "additive" else 0.0)
+
+
+def test_pictures_are_scaled_down_only():
+    pixels = np.zeros((100, 400, 3), dtype=np.float32)
+    assert scaled(pixels, 100).shape == (3, 50, 200)
+    assert scaled(pixels, 1000).shape == (3, 100, 400)
+
+
+def test_everything_that_moves_has_a_rate():
+    names = {name for group in from_scene(random_scene(layers=20)).groups for name, _ in group.tensors()}
+    assert names | {"background"} == set(RATES)

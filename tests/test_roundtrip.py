@@ -1,0 +1,170 @@
+"""Exports drawn by real engines against the torch render in float64: the promise of the project."""
+
+import numpy as np
+import pytest
+
+import sdf2vec
+from sdf2vec import Layer, Scene, Shape, blend, roundtrip
+from sdf2vec.engines import ENGINES, glslang_validate
+from sdf2vec.export import export
+from sdf2vec.export.options import Options
+from sdf2vec.lower.shader import literal
+from sdf2vec.roundtrip import ROUND_TRIPS, compare
+from sdf2vec.shapes import KINDS
+
+from .scenes import random_scene
+
+SIZES = [(60, 40), (133, 71), (9, 6)]  # the fitted one, one larger and of another shape, a tiny one
+LARGEST, MEAN = 0.25, 0.05  # levels of 255
+
+
+def text_of(scene: Scene, target: str, **options: str) -> str:
+    text = export(scene, target, Options(**options))  # type: ignore[arg-type]
+    assert isinstance(text, str)
+    return text
+
+
+def assert_same(scene, target, sizes=SIZES, largest=LARGEST, **options):
+    text = text_of(scene, target, **options)
+    for size in sizes:
+        result = compare(ROUND_TRIPS[target], text, scene, size)
+        assert result.largest_error <= largest, (target, size, result)
+        assert abs(result.mean_error) <= MEAN, (target, size, result)
+
+
+@pytest.mark.parametrize("compositing", ["over", "additive"])
+@pytest.mark.parametrize("kind", KINDS)
+@pytest.mark.parametrize("target", ["glsl", "shadertoy", "wgsl"])
+def test_every_kind_and_compositing(target, kind, compositing, require_engine):
+    require_engine(ROUND_TRIPS[target].engine)
+    assert_same(random_scene((kind,), compositing, seed=1), target)
+
+
+@pytest.mark.parametrize("compositing", ["over", "additive"])
+@pytest.mark.parametrize("target", ["glsl", "shadertoy", "wgsl"])
+def test_mixed_kinds_on_a_transparent_ground(target, compositing, require_engine):
+    require_engine(ROUND_TRIPS[target].engine)
+    assert_same(random_scene(compositing=compositing, layers=20, seed=2, transparent=True), target)
+
+
+@pytest.mark.parametrize("compositing", ["over", "additive"])
+@pytest.mark.parametrize("kinds", [("box",), tuple(KINDS)])
+@pytest.mark.parametrize("version", ["es300", "330"])
+def test_tables(kinds, compositing, version, require_engine):
+    require_engine("opengl")
+    scene = random_scene(kinds, compositing, layers=20, seed=3)
+    text = text_of(scene, "glsl", layout="table", glsl=version)
+    assert "const vec4 table" in text
+    assert_same(scene, "glsl", layout="table", glsl=version)
+
+
+def test_tables_without_unions(require_engine):
+    require_engine("opengl")
+    layers = tuple(layer for layer in random_scene(layers=20, seed=5).layers if len(layer.shapes) == 1)
+    assert_same(Scene(60, 40, layers), "shadertoy", layout="table")
+
+
+def test_desktop_glsl(require_engine):
+    require_engine("opengl")
+    text = text_of(random_scene(seed=6), "glsl", glsl="330")
+    assert text.startswith("#version 330\n")
+    assert_same(random_scene(seed=6), "glsl", glsl="330")
+
+
+@pytest.mark.parametrize("target", ["glsl", "shadertoy", "wgsl"])
+@pytest.mark.parametrize("size", [(1, 1), (1, 50), (200, 3)])
+def test_odd_canvases(target, size, require_engine):
+    require_engine(ROUND_TRIPS[target].engine)
+    assert_same(random_scene(width=size[0], height=size[1], seed=8), target, [size, (17, 5)])
+
+
+@pytest.mark.parametrize("target", ["glsl", "shadertoy", "wgsl"])
+def test_a_scene_without_layers(target, require_engine):
+    require_engine(ROUND_TRIPS[target].engine)
+    assert_same(Scene(6, 4, (), (0.1, 0.2, 0.3)), target)
+    assert_same(Scene(6, 4, (), None), target)
+
+
+@pytest.fixture(scope="module")
+def photo_scene():
+    """A real photo, fitted with all kinds."""
+    data = pytest.importorskip("skimage.data")
+    return sdf2vec.fit(data.coffee()[::4, ::4], 24, kind="mixed", preset="fast", seed=3)
+
+
+@pytest.mark.parametrize("target", ["glsl", "shadertoy", "wgsl"])
+def test_a_fitted_photo_with_mixed_kinds(target, photo_scene, require_engine):
+    require_engine(ROUND_TRIPS[target].engine)
+    assert {layer.kind for layer in photo_scene.layers} == set(KINDS)
+    assert_same(photo_scene, target, [(photo_scene.width, photo_scene.height), (301, 170), (16, 11)])
+
+
+def test_eight_bit_read_back_is_within_a_level(photo_scene, require_engine):
+    require_engine("opengl")
+    text = text_of(photo_scene, "glsl")
+    drawn = ROUND_TRIPS["glsl"].draw(text, 150, 100)
+    png = sdf2vec.render(photo_scene, 150, 100)
+    eight = [np.round(np.clip(pixels[..., :3], 0, 1) * 255) for pixels in (drawn, png)]
+    assert np.abs(eight[0] - eight[1]).max() <= 1
+
+
+@pytest.mark.parametrize("target", ["glsl", "shadertoy", "wgsl"])
+def test_a_formula_that_drifts_is_seen(target, require_engine, monkeypatch):
+    """The check itself can fail: a falloff that is 2 % off in the exported text alone."""
+    require_engine(ROUND_TRIPS[target].engine)
+    text = text_of(random_scene(seed=1), target)
+    number = literal(blend.STEEPNESS)
+    assert f"{number} * (0.5 * falloff" in text
+    broken = text.replace(f"{number} * (0.5 * falloff", f"{number[:-1]}2 * (0.5 * falloff")
+    result = compare(ROUND_TRIPS[target], broken, random_scene(seed=1), (60, 40))
+    assert result.largest_error > LARGEST
+    assert result.verdict != "same"
+
+
+@pytest.mark.parametrize("target", ["glsl", "shadertoy", "wgsl"])
+def test_half_a_pixel_is_seen(target, require_engine):
+    require_engine(ROUND_TRIPS[target].engine)
+    text = text_of(random_scene(seed=1), target)
+    broken = text.replace("(pixel - 0.5 * resolution)", "(pixel - 0.5 * resolution + 0.5)")
+    assert broken != text
+    assert compare(ROUND_TRIPS[target], broken, random_scene(seed=1), (60, 40)).largest_error > LARGEST
+
+
+def test_check_reports_every_target_at_three_sizes(require_engine):
+    for engine in ("opengl", "webgpu", "resvg"):
+        require_engine(engine)
+    results = sdf2vec.check(random_scene(seed=9, layers=4))
+    assert {result.target for result in results} == {"glsl", "shadertoy", "wgsl", "svg"}
+    assert all(result.verdict == "same" for result in results if result.target != "svg")
+    assert len(results) == 12
+
+
+def test_check_says_what_is_missing(monkeypatch):
+    class Missing:
+        def missing(self):
+            return "not installed: pip install it"
+
+    monkeypatch.setitem(ENGINES, "opengl", Missing())
+    (result,) = sdf2vec.check(random_scene(seed=9, layers=1), ["glsl"])
+    assert (result.verdict, result.missing) == ("not checked", "not installed: pip install it")
+
+
+def test_shader_text_is_readable():
+    circle = Shape.of("circle", (1, 0.5, 0), center=(0.1, -0.2), radius=0.25)
+    text = export(Scene(30, 20, (Layer((circle,), 0.05, 0.9),)), "glsl", Options(title="photo.png"))
+    line = (
+        "  c = over(c, vec3(1.0, 0.5, 0.0), 0.9, coverage(sdCircle(p - vec2(0.1, -0.2), 0.25), 0.05, pixel));"
+    )
+    assert line in text.splitlines()
+    assert "// photo.png in 1 shapes, fitted at 30 x 20." in text
+    assert "precision highp float;" in text
+
+
+@pytest.mark.parametrize("layout", ["readable", "table"])
+@pytest.mark.parametrize("version", ["es300", "330"])
+def test_glslang_accepts_every_text(layout, version, require_engine):
+    require_engine("glslang")
+    scene = random_scene(layers=12, seed=10)
+    assert glslang_validate(text_of(scene, "glsl", layout=layout, glsl=version)) is None
+    whole = roundtrip.SHADERTOY_HEAD + text_of(scene, "shadertoy", layout=layout) + roundtrip.SHADERTOY_TAIL
+    assert glslang_validate(whole) is None
