@@ -14,7 +14,7 @@ that keep NaN away (a square root at zero, ties of `min`) are made in its rows a
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Hashable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Container, Hashable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from enum import Enum
 from functools import partial
@@ -195,7 +195,7 @@ class Cell:
 class Operation:
     """One row: types, spelling per target, value on constants, derivative.
 
-    A row either has `torch`, `value` and `partials` (it works on floats; vectors go component by component)
+    A row either has `torch`, `numba`, `value` and `partials` (it works on floats; vectors go by component)
     or `expand` (other rows define it once its arguments are split into components).
     """
 
@@ -203,6 +203,7 @@ class Operation:
     glsl: Cell
     wgsl: Cell
     torch: str | None = None
+    numba: str | None = None
     value: Callable[..., float] | None = None
     partials: Callable[..., tuple[Operand | None, ...]] | None = None
     expand: Callable[..., tuple[Expr, ...]] | None = None
@@ -313,6 +314,7 @@ OPERATIONS: dict[str, Operation] = {
         _widest,
         *_both(_arithmetic("+")),
         torch="{0} + {1}",
+        numba="{0} + {1}",
         value=lambda a, b: a + b,
         partials=lambda a, b, y: (1.0, 1.0),
     ),
@@ -320,6 +322,7 @@ OPERATIONS: dict[str, Operation] = {
         _widest,
         *_both(_arithmetic("-")),
         torch="{0} - {1}",
+        numba="{0} - {1}",
         value=lambda a, b: a - b,
         partials=lambda a, b, y: (1.0, -1.0),
     ),
@@ -327,6 +330,7 @@ OPERATIONS: dict[str, Operation] = {
         _widest,
         *_both(_arithmetic("*")),
         torch="{0} * {1}",
+        numba="{0} * {1}",
         value=lambda a, b: a * b,
         partials=lambda a, b, y: (b, a),
     ),
@@ -334,6 +338,7 @@ OPERATIONS: dict[str, Operation] = {
         _widest,
         *_both(_arithmetic("/")),
         torch="{0} / {1}",
+        numba="{0} / {1}",
         value=lambda a, b: a / b,
         partials=lambda a, b, y: (1.0 / b, -(y / b)),
         domain="divisor not 0: whoever divides keeps it away from 0",
@@ -342,6 +347,7 @@ OPERATIONS: dict[str, Operation] = {
         _widest,
         *_both(Cell("-{0}", PRECEDENCE["unary"])),
         torch="-{0}",
+        numba="-{0}",
         value=lambda a: -a,
         partials=lambda a, y: (-1.0,),
     ),
@@ -349,6 +355,7 @@ OPERATIONS: dict[str, Operation] = {
         _widest,
         *_both(_call("abs")),
         torch="torch.where({0} < 0, -{0}, {0})",
+        numba="({0} if {0} > ZERO else -{0})",
         value=abs,
         partials=lambda a, y: (select(a < 0.0, -1.0, 1.0),),
     ),
@@ -356,6 +363,7 @@ OPERATIONS: dict[str, Operation] = {
         _equal,
         *_both(_call("min", 2)),
         torch="torch.where({0} < {1}, {0}, {1})",
+        numba="({0} if {0} < {1} else {1})",
         value=min,
         partials=lambda a, b, y: (select(a < b, 1.0, 0.0), select(a < b, 0.0, 1.0)),
     ),
@@ -363,6 +371,7 @@ OPERATIONS: dict[str, Operation] = {
         _equal,
         *_both(_call("max", 2)),
         torch="torch.where({0} > {1}, {0}, {1})",
+        numba="({0} if {0} > {1} else {1})",
         value=max,
         partials=lambda a, b, y: (select(a > b, 1.0, 0.0), select(a > b, 0.0, 1.0)),
     ),
@@ -371,6 +380,7 @@ OPERATIONS: dict[str, Operation] = {
         _widest,
         *_both(_call("sqrt")),
         torch=_SQRT,
+        numba="sqrt({0} if {0} > ZERO else ZERO)",
         value=lambda a: math.sqrt(max(a, 0.0)),
         partials=lambda a, y: (select(a > 0.0, 0.5 / y, 0.0),),
         domain="not below 0; the derivative at 0 is 0",
@@ -379,6 +389,7 @@ OPERATIONS: dict[str, Operation] = {
         _widest,
         *_both(_call("exp")),
         torch="torch.exp({0})",
+        numba="fast_exp({0})",
         value=math.exp,
         partials=lambda a, y: (y,),
         domain="at most 80, so that float32 holds it",
@@ -387,6 +398,7 @@ OPERATIONS: dict[str, Operation] = {
         _widest,
         *_both(Cell("log(max({0}, 1e-30))")),
         torch="torch.log(torch.where({0} > 1e-30, {0}, 1e-30))",
+        numba="log({0} if {0} > LEAST else LEAST)",
         value=lambda a: math.log(max(a, 1e-30)),
         partials=lambda a, y: (select(a > 1e-30, 1.0 / a, 0.0),),
         domain="below 1e-30 it stays what it is there",
@@ -395,6 +407,7 @@ OPERATIONS: dict[str, Operation] = {
         _widest,
         *_both(_call("sin")),
         torch="torch.sin({0})",
+        numba="fast_sin({0})",
         value=math.sin,
         partials=lambda a, y: (cos(a),),
         domain="a few hundred radians, beyond which float32 loses the phase",
@@ -403,6 +416,7 @@ OPERATIONS: dict[str, Operation] = {
         _widest,
         *_both(_call("cos")),
         torch="torch.cos({0})",
+        numba="fast_sin({0} + QUARTER)",
         value=math.cos,
         partials=lambda a, y: (-sin(a),),
         domain="a few hundred radians, beyond which float32 loses the phase",
@@ -411,6 +425,7 @@ OPERATIONS: dict[str, Operation] = {
         _widest,
         *_both(_SIGMOID),
         torch="torch.sigmoid({0})",
+        numba="fast_sigmoid({0})",
         value=_sigmoid,
         partials=lambda a, y: (y * (1.0 - y),),
     ),
@@ -418,6 +433,7 @@ OPERATIONS: dict[str, Operation] = {
         _compared,
         *_both(_arithmetic("<")),
         torch="{0} < {1}",
+        numba="{0} < {1}",
         value=lambda a, b: float(a < b),
         partials=lambda a, b, y: (None, None),
     ),
@@ -426,8 +442,18 @@ OPERATIONS: dict[str, Operation] = {
         Cell("{0} ? {1} : {2}", PRECEDENCE["?"]),
         Cell("select({2}, {1}, {0})"),
         torch="torch.where({0}, {1}, {2})",
+        numba="({1} if {0} else {2})",
         value=lambda condition, a, b: a if condition else b,
         partials=lambda condition, a, b, y: (None, select(condition, 1.0, 0.0), select(condition, 0.0, 1.0)),
+    ),
+    "fixed": Operation(
+        _widest,
+        *_both(Cell("{0}", PRECEDENCE["unary"], operands=CALL)),
+        torch="{0}.detach()",
+        numba="{0}",
+        value=lambda a: a,
+        partials=lambda a, y: (None,),
+        domain="its derivative counts as 0",
     ),
     "mix": Operation(_blended, *_both(_call("mix", 3)), expand=_mix),
     "dot": Operation(_reduced, *_both(_call("dot", 2)), expand=_dot),
@@ -564,6 +590,11 @@ def cos(x: Expr) -> Expr:
 def sigmoid(x: Expr) -> Expr:
     """1 / (1 + e^−x)."""
     return operation("sigmoid", x)
+
+
+def fixed(x: Expr) -> Expr:
+    """`x` as if it were constant: for values at which the derivative is known to vanish."""
+    return operation("fixed", x)
 
 
 def select(condition: Expr, if_true: Operand, if_false: Operand) -> Expr:
@@ -733,13 +764,19 @@ _SPLIT: dict[str, Callable[[Expr, list[Split], Mapping[Expr, Split]], Split]] = 
 
 def gradient(output: Expr, variables: Sequence[Expr]) -> tuple[Expr, ...]:
     """Derivatives of a scalarized float expression by float variables, in one backward pass."""
-    adjoint: dict[Expr, Expr] = {output: const(1.0)}
-    for node in reversed(list(walk([output]))):
-        if node not in adjoint or not node.args:
+    found = adjoints({output: const(1.0)})
+    return tuple(found.get(variable, const(0.0)) for variable in variables)
+
+
+def adjoints(seeds: Mapping[Expr, Expr], leaves: Container[Expr] = ()) -> dict[Expr, Expr]:
+    """Derivatives of Σ seed·node by every float node below, of scalarized nodes; `leaves` are not entered."""
+    found: dict[Expr, Expr] = dict(seeds)
+    for node in reversed(list(walk(seeds))):
+        if node not in found or not node.args or node in leaves:
             continue
         partials = OPERATIONS[node.op].partials
         assert partials is not None, f"{node.op} must be scalarized first"
         for arg, slope in zip(node.args, partials(*node.args, node), strict=True):
             if slope is not None:
-                adjoint[arg] = adjoint.get(arg, const(0.0)) + adjoint[node] * slope
-    return tuple(adjoint.get(variable, const(0.0)) for variable in variables)
+                found[arg] = found.get(arg, const(0.0)) + found[node] * slope
+    return found

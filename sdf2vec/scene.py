@@ -25,6 +25,7 @@ from .shapes import KINDS, LARGEST, Kind, Parameter
 FORMAT = "sdf2vec scene"
 VERSION = 1
 MAX_SHAPES = 65536
+MAX_UNION = 256  # shapes in one layer: each is a term of one formula
 MAX_SIDE = 65536  # pixels
 GEOMETRY_DECIMALS = 6
 COLOR_DECIMALS = 5
@@ -178,6 +179,8 @@ class Layer:
     def __post_init__(self) -> None:
         if not self.shapes:
             raise SceneError("union", "must hold at least 1 shape, got 0")
+        if len(self.shapes) > MAX_UNION:
+            raise SceneError("union", f"at most {MAX_UNION} shapes, got {len(self.shapes)}")
         kinds = dict.fromkeys(shape.kind for shape in self.shapes)
         if len(kinds) > 1:
             raise SceneError("union", f"shapes must be of one kind, got {' and '.join(kinds)}")

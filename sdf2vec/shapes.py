@@ -21,6 +21,7 @@ from .expr import (
     components_of,
     cos,
     dot,
+    fixed,
     function,
     length,
     let,
@@ -246,7 +247,8 @@ def _box_outline(
 
 def _side(start: Expr, edge: Expr, turn: Expr) -> Expr:
     """Squared distance to an edge, and a number that is positive on the inner side of its line."""
-    along = clamp(dot(start, edge) / maximum(dot(edge, edge), TINY), 0.0, 1.0)
+    # moving along the edge does not change the smallest distance, so `along` counts as constant
+    along = fixed(clamp(dot(start, edge) / maximum(dot(edge, edge), TINY), 0.0, 1.0))
     q = start - edge * along
     return vec2(dot(q, q), turn * _cross(start, edge))
 

@@ -85,6 +85,7 @@ MEANINGS: dict[str, Meaning] = {
         [(*pair, 2.0, -3.0) for pair in _pairs([0.0, 1.0, -1e-7])],
         kinks=True,
     ),
+    "fixed": Meaning(1, _op("fixed"), lambda a: a, _singles(HARD)),
     "mix": Meaning(
         5,
         lambda a, b, c, d, t: operation("mix", vec2(a, b), vec2(c, d), t),

@@ -15,6 +15,7 @@ from sdf2vec.expr import (
     clamp,
     const,
     constant,
+    fixed,
     function,
     gradient,
     hoist,
@@ -128,7 +129,7 @@ def test_every_row_is_complete_and_every_operation_has_a_meaning():
     for name, row in OPERATIONS.items():
         assert row.glsl.text, name
         assert row.wgsl.text, name
-        own = (row.torch, row.value, row.partials)
+        own = (row.torch, row.numba, row.value, row.partials)
         assert all(own) != bool(row.expand), name
         assert any(own) == all(own), name
 
@@ -189,7 +190,12 @@ def smooth_cases(arity):
     return np.array([[SMOOTH[(start + 2 * i) % 5] + 0.01 * i for i in range(arity)] for start in range(5)])
 
 
-@pytest.mark.parametrize("name", OPERATIONS)
+def test_fixed_counts_as_constant():
+    assert [constant(part) for part in gradient(fixed(a) * b, [a])] == [0.0]
+    assert gradient(fixed(a) * b, [b]) == (fixed(a),)
+
+
+@pytest.mark.parametrize("name", [n for n in OPERATIONS if n != "fixed"])
 def test_derivatives_match_central_differences(name):
     meaning = MEANINGS[name]
     cases = smooth_cases(meaning.arity)

@@ -109,11 +109,11 @@ def main() -> None:
     parser.add_argument("--seed", type=int, default=0)
     parser.add_argument("-o", "--output", type=Path, required=True)
     options = parser.parse_args()
-    names = " ".join(path.name for path in options.pictures)
+    names = " ".join(map(str, options.pictures))
     command = (
         f"python -m sdf2vec.bench.quality {names} --shapes {options.shapes} --kinds {options.kinds} "
         f"--compositing {options.compositing} --preset {options.preset} --seed {options.seed} "
-        f"-o {options.output.name}"
+        f"-o {options.output}"
     )
     write_atomically(options.output, table(list(_rows(options)), command).encode())
 

@@ -16,6 +16,7 @@ import svgwrite
 from ..blend import CUTOFF, MIN_FALLOFF_PIXELS, REACH, coverage, smooth_union
 from ..errors import Sdf2vecError
 from ..expr import VEC2, components_of, const, constant, scalarize, var, vec3
+from ..files import one_line
 from ..scene import Color, Layer, Scene
 from ..shapes import KINDS, EllipseOutline, Outline, Point, PolygonOutline, RectangleOutline
 from .constants import constants
@@ -24,6 +25,8 @@ from .options import Options
 STOPS = 16
 GAUSSIAN = math.pi / math.sqrt(3.0) / 10.0  # standard deviation of the edge's logistic profile, in falloffs
 TRACE = 768  # grid cells along the shortest side when a contour is traced
+MAX_CELLS = 2048  # grid cells along any side
+CHUNK = 1 << 20  # grid points × shapes computed at a time
 TOLERANCE = 0.15  # pixels that a traced contour may be simplified by
 
 
@@ -40,10 +43,11 @@ class _Writer:
     def __init__(self, scene: Scene, options: Options) -> None:
         self.scene = scene
         self.unit = float(min(scene.width, scene.height))  # pixels in a scene unit
+        self.digits = max(2, 4 - int(math.log10(self.unit)))  # decimals: a drawing is shown at any size
         size = (scene.width, scene.height)
         self.drawing = svgwrite.Drawing(size=size, viewBox=f"0 0 {scene.width} {scene.height}", debug=False)
         self.drawing.attribs["role"] = "img"
-        self.drawing.set_desc(title=options.title)
+        self.drawing.set_desc(title=one_line(options.title))
         self.count = 0
 
     def text(self) -> str:
@@ -81,11 +85,11 @@ class _Writer:
                 id=self._new_id("blur"),
                 filterUnits="userSpaceOnUse",
                 start=self.point(low),
-                size=[_short((b - a) * self.unit) for a, b in zip(low, high, strict=True)],
+                size=[self.length(b - a) for a, b in zip(low, high, strict=True)],
             )
         )
         blur.attribs["color-interpolation-filters"] = "sRGB"
-        blur.feGaussianBlur(in_="SourceGraphic", stdDeviation=_short(GAUSSIAN * layer.falloff * self.unit))
+        blur.feGaussianBlur(in_="SourceGraphic", stdDeviation=self.length(GAUSSIAN * layer.falloff))
         return str(blur.get_funciri())
 
     def _gradient_ellipse(self, edge: EllipseOutline, layer: Layer, color: Color) -> Any:
@@ -98,7 +102,7 @@ class _Writer:
             offset = (1.0 + distance / shortest) / grown
             if offset >= 0.0:
                 self._stop(gradient, offset, color, layer.opacity * _coverage(distance, layer.falloff))
-        if -shortest > 0.5 * layer.falloff - reach:
+        if -shortest > (0.5 - REACH) * layer.falloff:
             self._stop(gradient, 0.0, color, layer.opacity * _coverage(-shortest, layer.falloff))
         gradient.elements.sort(key=lambda stop: float(stop.attribs["offset"]))
         outline = EllipseOutline(edge.center, (edge.radii[0] * grown, edge.radii[1] * grown), edge.angle)
@@ -110,7 +114,7 @@ class _Writer:
         gradient.add_stop_color(_short(offset, 4), _hex(color), _short(opacity, 4))
 
     def _traced(self, layer: Layer, color: Color, soft: bool) -> list[Any]:
-        path = " ".join(self._path(contour) for contour in _trace(layer, self.unit))
+        path = " ".join(self._path(contour) for contour in _trace(layer, self))
         if not path:
             return []
         element = self.drawing.path(d=path)
@@ -124,12 +128,16 @@ class _Writer:
     def point(self, p: Point) -> tuple[float, float]:
         """A scene point in pixels."""
         return (
-            _short(p[0] * self.unit + self.scene.width / 2),
-            _short(p[1] * self.unit + self.scene.height / 2),
+            _short(p[0] * self.unit + self.scene.width / 2, self.digits),
+            _short(p[1] * self.unit + self.scene.height / 2, self.digits),
         )
 
+    def length(self, value: float) -> float:
+        """A length of the scene in pixels."""
+        return _short(value * self.unit, self.digits)
+
     def lengths(self, values: Point) -> tuple[float, float]:
-        return _short(values[0] * self.unit), _short(values[1] * self.unit)
+        return self.length(values[0]), self.length(values[1])
 
     def _new_id(self, prefix: str) -> str:
         self.count += 1
@@ -156,7 +164,7 @@ def _(outline: EllipseOutline, writer: _Writer) -> Any:
 def _(outline: RectangleOutline, writer: _Writer) -> Any:
     center, half = outline.center, outline.half_size
     corner = writer.point((center[0] - half[0], center[1] - half[1]))
-    radius = _short(outline.corner_radius * writer.unit)
+    radius = writer.length(outline.corner_radius)
     rect = writer.drawing.rect(corner, writer.lengths((2 * half[0], 2 * half[1])))
     if radius > 0:
         rect.attribs["rx"] = radius
@@ -179,7 +187,7 @@ def _turned(element: Any, angle: float, center: Point) -> Any:
 
 def _rounded_polygon(outline: PolygonOutline, writer: _Writer) -> str:
     """Straight edges moved outwards, joined by arcs."""
-    points = np.array(outline.points)
+    points = np.array(list(dict.fromkeys(outline.points)))
     edges = np.roll(points, -1, axis=0) - points
     area = np.sum(
         points[:, 0] * np.roll(points, -1, axis=0)[:, 1] - np.roll(points, -1, axis=0)[:, 0] * points[:, 1]
@@ -189,7 +197,7 @@ def _rounded_polygon(outline: PolygonOutline, writer: _Writer) -> str:
         edges = np.roll(points, -1, axis=0) - points
     lengths = np.maximum(np.hypot(edges[:, 0], edges[:, 1]), 1e-9)
     outwards = np.stack([edges[:, 1], -edges[:, 0]], axis=1) / lengths[:, None] * outline.rounding
-    radius = f"{_short(outline.rounding * writer.unit):g}"
+    radius = f"{writer.length(outline.rounding):g}"
     parts = []
     for start, end, out in zip(points, np.roll(points, -1, axis=0), outwards, strict=True):
         (x0, y0), (x1, y1) = writer.point(tuple(start + out)), writer.point(tuple(end + out))
@@ -199,21 +207,27 @@ def _rounded_polygon(outline: PolygonOutline, writer: _Writer) -> str:
     )
 
 
-def _trace(layer: Layer, unit: float) -> list[np.ndarray]:
-    """Contours of coverage one half, each [M, 2] in scene units."""
+def _trace(layer: Layer, writer: _Writer) -> list[np.ndarray]:
+    """Contours of coverage one half, each [M, 2] in scene units; cut off where they can't be seen."""
     from skimage.measure import approximate_polygon, find_contours
 
-    low, high = _extent(layer)
-    step = 1.0 / TRACE
+    margin = layer.falloff + 2.0 / writer.unit  # farther than a blur reaches
+    edge = np.array(writer.scene.extent) / 2 + margin
+    low, high = np.clip(_extent(layer), -edge, edge)
+    if (low >= high).any():
+        return []
+    step = max(1.0 / TRACE, float((high - low).max()) / MAX_CELLS)
     x = np.arange(low[0] - step, high[0] + 2 * step, step)
     y = np.arange(low[1] - step, high[1] + 2 * step, step)
-    field = _distance_field(layer, x, y)
-    contours = find_contours(field, 0.5 * layer.falloff)
-    tolerance = TOLERANCE / (unit * step)
-    return [approximate_polygon(c, tolerance)[:, ::-1] * step + (x[0], y[0]) for c in contours]
+    level = 0.5 * layer.falloff
+    field = np.pad(_distance_field(layer, x, y), 1, constant_values=level + step)  # closes what is cut off
+    corner = (x[0] - step, y[0] - step)
+    tolerance = TOLERANCE / (writer.unit * step)
+    return [approximate_polygon(c, tolerance)[:, ::-1] * step + corner for c in find_contours(field, level)]
 
 
 def _distance_field(layer: Layer, x: np.ndarray, y: np.ndarray) -> np.ndarray:
+    """Distances to a layer at all points of a grid, [Y, X]."""
     import torch
 
     from ..lower.torch import compile_torch
@@ -225,9 +239,10 @@ def _distance_field(layer: Layer, x: np.ndarray, y: np.ndarray) -> np.ndarray:
     distance, _ = smooth_union(distances, [vec3(0.0)] * len(suffixes), const(layer.smoothness))
     inputs = [*components_of(p), *(s for suffix in suffixes for s in kind.scalars(suffix))]
     flat = [torch.tensor(v, dtype=torch.float64) for shape in layer.shapes for v in shape.parameters]
-    columns, rows = torch.from_numpy(x)[None, :], torch.from_numpy(y)[:, None]
-    (field,) = compile_torch([distance], inputs)(columns, rows, *flat)
-    return np.asarray(field.numpy())
+    columns = torch.from_numpy(x)[None, :]
+    field = compile_torch([distance], inputs)
+    chunks = torch.from_numpy(y)[:, None].split(max(1, CHUNK // (len(x) * len(layer.shapes))))
+    return np.concatenate([field(columns, rows, *flat)[0].numpy() for rows in chunks])
 
 
 def _extent(layer: Layer) -> tuple[Point, Point]:
