@@ -35,6 +35,11 @@ MIN_FALLOFF_PIXELS = 1.6  # a logistic edge of this falloff has the variance of 
 REACH = math.log(1.0 / CUTOFF - 1.0) / STEEPNESS  # half the width of the soft edge, in falloffs
 
 
+def saturation(falloff: Expr, pixel: Expr) -> Expr:
+    """The distance up to which `coverage` is exactly 1."""
+    return 0.5 * falloff - REACH * _softness(falloff, pixel)
+
+
 def _softness(falloff: Expr, pixel: Expr) -> Expr:
     return maximum(falloff, MIN_FALLOFF_PIXELS * pixel)
 

@@ -19,6 +19,7 @@ from .expr import (
     absolute,
     clamp,
     components_of,
+    const,
     cos,
     dot,
     fixed,
@@ -105,8 +106,8 @@ class Kind:
     """A kind of shape.
 
     `distance(p, *parameters)` is the signed distance, negative inside. `exact` says whether it is the true
-    Euclidean distance everywhere; where it is not, it never exceeds the true distance in slope by more than
-    the shape's own documentation says. `extent(margin, *parameters)` is a box (low x, low y, high x, high y)
+    Euclidean distance everywhere. `slope(*parameters)` bounds how fast it changes, which is 1 for a distance.
+    `extent(margin, *parameters)` is a box (low x, low y, high x, high y)
     that holds every point with distance ≤ margin, for margin ≥ 0. `outline(offset, *parameters)` is the
     contour at `distance = offset`, where it has a simple form.
     """
@@ -117,6 +118,7 @@ class Kind:
     extent: Callable[..., Expr]
     exact: bool
     outline: Callable[..., Outline] | None = None
+    slope: Callable[..., Expr] = lambda *parameters: const(1.0)
 
     def variables(self, suffix: str = "") -> tuple[Expr, ...]:
         """One variable for each parameter."""
@@ -291,6 +293,10 @@ def _displaced_extent(margin: Expr, center: Expr, radius: Expr, amplitude: Expr,
     return _box_around(center, vec2(radius + absolute(amplitude) + margin))
 
 
+def _displaced_slope(center: Expr, radius: Expr, amplitude: Expr, frequency: Expr) -> Expr:
+    return 1.0 + absolute(amplitude) * length(frequency)
+
+
 # --- the shapes ---------------------------------------------------------------------------------------------
 
 KINDS: dict[str, Kind] = {
@@ -344,6 +350,7 @@ KINDS: dict[str, Kind] = {
             _displaced_distance,
             _displaced_extent,
             exact=False,
+            slope=_displaced_slope,
         ),
     )
 }

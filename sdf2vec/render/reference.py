@@ -9,6 +9,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from functools import cache
 
+import numpy as np
 import torch
 from torch.utils.checkpoint import checkpoint
 
@@ -60,6 +61,20 @@ def canvas(tensors: SceneTensors, width: int, height: int) -> Tensors:
     y, x = torch.meshgrid(rows, columns, indexing="ij")
     sizes = [like.new_tensor(value) for value in (width, height, *tensors.size)]
     return _canvas()(x.flatten(), y.flatten(), *sizes)
+
+
+def canvas_axes(
+    tensors: SceneTensors, columns: int, rows: int, width: int, height: int
+) -> tuple[np.ndarray, np.ndarray, np.float32]:
+    """Scene coordinates x [columns], y [rows] of pixel centres, and the size of a pixel; float32.
+
+    The canvas has width × height pixels; the axes may go on beyond its edges.
+    """
+    sizes = [torch.tensor(value, dtype=torch.float64) for value in (width, height, *tensors.size)]
+    places = torch.arange(max(columns, rows), dtype=torch.float64) + 0.5
+    x, y, pixel = _canvas()(places, places, *sizes)
+    axes = (axis.numpy().astype(np.float32) for axis in (x[:columns], y[:rows]))
+    return (*axes, np.float32(pixel))
 
 
 def _composite(tensors: SceneTensors, x: torch.Tensor, y: torch.Tensor, pixel: torch.Tensor) -> torch.Tensor:
