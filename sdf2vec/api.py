@@ -100,28 +100,30 @@ def check_settings(
     _check_choice("preset", preset, tuple(PRESETS))
     if loss is not None:
         _check_choice("loss", loss, LOSS_NAMES)
-    if not 1 <= shapes <= MAX_SHAPES:
-        raise Sdf2vecError(f"the number of shapes must be between 1 and {MAX_SHAPES}, got {shapes}")
-    if not 0 <= seed < 2**63:
-        raise Sdf2vecError(f"the seed must be between 0 and 2^63 - 1, got {seed}")
+    _check_whole("number of shapes", shapes, 1, MAX_SHAPES)
+    _check_whole("seed", seed, 0, 2**63 - 1)
     return kinds
 
 
 def kinds_of(kind: str | Sequence[str]) -> tuple[str, ...]:
     """Names of kinds from one name, several, or "mixed". Raises Sdf2vecError for an unknown one."""
     names = [kind] if isinstance(kind, str) else list(kind)
-    chosen = list(KINDS) if MIXED in names else list(dict.fromkeys(names))
-    for name in chosen:
+    for name in names:
         _check_choice("kind", name, (*KINDS, MIXED))
-    if not chosen:
+    if not names:
         raise Sdf2vecError("at least one kind of shape is needed")
-    return tuple(chosen)
+    return tuple(KINDS) if MIXED in names else tuple(dict.fromkeys(names))
 
 
 def check_targets(targets: Sequence[str]) -> None:
     """Raises Sdf2vecError for an unknown export target."""
     for target in targets:
         _check_choice("target", target, tuple(EXPORTERS))
+
+
+def _check_whole(what: str, value: Any, low: int, high: int) -> None:
+    if isinstance(value, bool) or not hasattr(value, "__index__") or not low <= value <= high:
+        raise Sdf2vecError(f"the {what} must be a whole number between {low} and {high}, got {value}")
 
 
 def _check_choice(what: str, value: str, known: Sequence[str]) -> None:

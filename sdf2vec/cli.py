@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import argparse
-import io
+import os
 import signal
 import sys
 import time
@@ -12,7 +12,7 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from types import FrameType
-from typing import TYPE_CHECKING, Literal, NoReturn
+from typing import TYPE_CHECKING, BinaryIO, Literal, NoReturn
 
 from . import __version__, api
 from .errors import Sdf2vecError
@@ -39,20 +39,31 @@ def main(argv: Sequence[str] | None = None) -> NoReturn:
     arguments = list(sys.argv[1:] if argv is None else argv)
     run = COMMANDS.get(arguments[0]) if arguments else None
     try:
-        sys.exit(run(arguments[1:]) if run else _convert(arguments))
+        status = run(arguments[1:]) if run else _convert(arguments)
+        sys.stdout.flush()
+        sys.exit(status)
     except Sdf2vecError as error:
         _complain(str(error))
         sys.exit(FAILED)
     except KeyboardInterrupt:
         _complain("interrupted")
         sys.exit(INTERRUPTED)
-    except BrokenPipeError:
-        sys.stderr.close()
+    except BrokenPipeError:  # whoever reads standard output has seen enough
+        _drop_output()
         sys.exit(OK)
+    except OSError as error:
+        _complain(f"{error.filename or 'standard output'}: {error.strerror or error}")
+        _drop_output()
+        sys.exit(FAILED)
 
 
 def _complain(message: str) -> None:
     print(f"sdf2vec: {one_line(message)}", file=sys.stderr)
+
+
+def _drop_output() -> None:
+    """Python writes what is left in its buffers when it ends, and would fail once more."""
+    os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
 
 
 class _Parser(argparse.ArgumentParser):
@@ -133,7 +144,7 @@ def _convert(arguments: list[str]) -> int:
     options = parser.parse_intermixed_args(arguments)
     targets = _targets(options.emit, "glsl")
     jobs = _plan(options.inputs, targets, options.output)
-    _check_settings(options)
+    _check_settings(options, targets)
     status = OK
     for job in jobs:
         try:
@@ -147,12 +158,14 @@ def _convert(arguments: list[str]) -> int:
     return status
 
 
-def _check_settings(options: argparse.Namespace) -> None:
-    """Refuses impossible settings before any work is done."""
+def _check_settings(options: argparse.Namespace, targets: list[str]) -> None:
+    """Refuses impossible settings, and targets that can't hold such a scene, before any work is done."""
     api.check_settings(
         options.shapes, _kinds(options), options.compositing, options.preset, options.loss, options.seed
     )
     Options(size=options.size, glsl=options.glsl, layout=options.layout)
+    for target in targets:
+        api.export(Scene(1, 1, (), compositing=options.compositing), target)
 
 
 def _kinds(options: argparse.Namespace) -> list[str]:
@@ -166,22 +179,8 @@ def _convert_one(job: _Job, options: argparse.Namespace) -> bool:
     for note in picture.notes:
         say(note)
     started = time.perf_counter()
-    with _stopping() as stop, _progress(options.quiet) as report:
-
-        def callback(progress: Progress) -> bool:
-            report(progress)
-            return stop.requested
-
-        scene = api.fit(
-            picture,
-            options.shapes,
-            kind=_kinds(options),
-            compositing=options.compositing,
-            preset=options.preset,
-            loss=options.loss,
-            seed=options.seed,
-            callback=callback,
-        )
+    with _stopping() as stop:
+        scene = _fit(picture, options, stop)
         seconds = time.perf_counter() - started
         quality = api.psnr(scene, picture)
         early = ", stopped early" if stop.requested else ""
@@ -193,10 +192,35 @@ def _convert_one(job: _Job, options: argparse.Namespace) -> bool:
         return stop.requested
 
 
+def _fit(picture: Picture, options: argparse.Namespace, stop: _Stop) -> Scene:
+    with _progress(options.quiet) as report:
+
+        def callback(progress: Progress) -> bool:
+            report(progress)
+            return stop.requested
+
+        return api.fit(
+            picture,
+            options.shapes,
+            kind=_kinds(options),
+            compositing=options.compositing,
+            preset=options.preset,
+            loss=options.loss,
+            seed=options.seed,
+            callback=callback,
+        )
+
+
 def _read_picture(source: str) -> Picture:
     if source != STREAM:
         return load(source)
-    return load(io.BytesIO(sys.stdin.buffer.read()))
+    return load(_standard_input())
+
+
+def _standard_input() -> BinaryIO:
+    if sys.stdin is None:
+        raise Sdf2vecError("standard input: is closed")
+    return sys.stdin.buffer
 
 
 def _name(source: str) -> str:
@@ -204,7 +228,7 @@ def _name(source: str) -> str:
 
 
 def _write_exports(scene: Scene, job: _Job, options: argparse.Namespace, say: Callable[[str], None]) -> None:
-    title = "a picture" if job.source == STREAM else Path(job.source).name
+    title = "a picture" if job.source == STREAM else one_line(Path(job.source).name)
     for target, path in job.outputs.items():
         data = api.export(
             scene, target, size=options.size, glsl=options.glsl, layout=options.layout, title=title
@@ -353,7 +377,7 @@ def _speaker(quiet: bool, to_stderr: bool) -> Callable[[str], None]:
 
     def say(line: str) -> None:
         if not quiet:
-            print(line, file=sys.stderr if to_stderr else sys.stdout, flush=True)
+            print(one_line(line), file=sys.stderr if to_stderr else sys.stdout, flush=True)
 
     return say
 
@@ -365,7 +389,7 @@ def _read_scene(source: str) -> Scene:
     if source != STREAM:
         return load_scene(source)
     try:
-        return loads_scene(sys.stdin.buffer.read())
+        return loads_scene(_standard_input().read())
     except Sdf2vecError as error:
         raise Sdf2vecError(f"standard input: {error}") from None
 
@@ -417,6 +441,7 @@ def _check_command(arguments: list[str]) -> int:
 
 def _print_table(results: list[Check]) -> None:
     from rich.console import Console
+    from rich.markup import escape
     from rich.table import Table
 
     table = Table(box=None, pad_edge=False)
@@ -430,7 +455,8 @@ def _print_table(results: list[Check]) -> None:
             f"{r.mean_error:+.4f}",
         )
         row = ("", "", "", "") if r.missing else numbers
-        table.add_row(r.target, r.engine, *row, f"{r.verdict}: {r.missing}" if r.missing else r.verdict)
+        verdict = f"{r.verdict}: {r.missing}" if r.missing else r.verdict
+        table.add_row(r.target, r.engine, *row, escape(verdict))
     Console(width=None if sys.stdout.isatty() else 200).print(table)
 
 

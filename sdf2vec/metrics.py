@@ -62,14 +62,15 @@ def _comparable(a: Tensor, b: Tensor) -> tuple[Tensor, Tensor]:
 def _local_means(stack: Tensor, window: int) -> Tensor:
     """Gaussian-weighted means of [N, C, H, W] over every window that lies inside."""
     n, c, height, width = stack.shape
-    down, across = (_gaussian(min(window, side - 1 + side % 2), stack) for side in (height, width))
+    down, across = (gaussian_window(side, window).to(stack) for side in (height, width))
     planes = stack.reshape(n * c, 1, height, width)
     means = F.conv2d(F.conv2d(planes, down.view(1, 1, -1, 1)), across.view(1, 1, 1, -1))
     return means.view(n, c, *means.shape[2:])
 
 
-def _gaussian(length: int, like: Tensor) -> Tensor:
-    """`length` weights (odd) that sum to 1, on the device and in the dtype of `like`."""
-    offset = torch.arange(length, device=like.device, dtype=like.dtype) - length // 2
+def gaussian_window(side: int, window: int = 11) -> Tensor:
+    """Weights that sum to 1, float64, for a picture of `side` pixels: as many as fit, an odd number."""
+    length = min(window, side - 1 + side % 2)
+    offset = torch.arange(length, dtype=torch.float64) - length // 2
     weights = torch.exp(-0.5 * (offset / _SIGMA).square())
     return weights / weights.sum()

@@ -25,7 +25,7 @@ from .shapes import KINDS, LARGEST, Kind, Parameter
 FORMAT = "sdf2vec scene"
 VERSION = 1
 MAX_SHAPES = 65536
-MAX_UNION = 256  # shapes in one layer: each is a term of one formula
+MAX_UNION = 128  # shapes in one layer: each is a term of one formula
 MAX_SIDE = 65536  # pixels
 GEOMETRY_DECIMALS = 6
 COLOR_DECIMALS = 5

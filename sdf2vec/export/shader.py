@@ -3,11 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from functools import cache
-from pathlib import Path
 from typing import Any
-
-from jinja2 import Environment, FileSystemLoader, StrictUndefined
 
 from ..blend import (
     COMPOSITING,
@@ -37,6 +33,7 @@ from ..expr import (
 from ..lower.shader import GLSL, WGSL, Dialect, definition, expression, literal, statements, used_functions
 from ..scene import Layer, Scene, Shape
 from ..shapes import KINDS
+from ..templating import template
 from .constants import constants
 from .options import GLSL_VERSIONS, Options
 
@@ -60,43 +57,21 @@ def wgsl(scene: Scene, options: Options) -> str:
     return _render("wgsl.jinja", WGSL, scene, options)
 
 
-def _render(template: str, dialect: Dialect, scene: Scene, options: Options, **more: str) -> str:
+def _render(name: str, dialect: Dialect, scene: Scene, options: Options, **more: str) -> str:
     # WGSL never gets a table: indexing a constant array by a variable hangs some of its compilers
     table = dialect is GLSL and (
         options.layout == "table" or (options.layout == "auto" and scene.shape_count > MAX_READABLE)
     )
     body = _table(scene) if table and scene.layers else _lines(scene, dialect)
     size = vec2(*(const(side) for side in scene.extent))
-    return (
-        _environment()
-        .get_template(template)
-        .render(
-            scene=scene,
-            title=options.title.replace("\n", " ").replace("\\", "/"),
-            size=expression(size, dialect),
-            background=expression(_background(scene), dialect),
-            **body,
-            **more,
-        )
+    return template(name).render(
+        scene=scene,
+        title=options.title.replace("\n", " ").replace("\\", "/"),
+        size=expression(size, dialect),
+        background=expression(_background(scene), dialect),
+        **body,
+        **more,
     )
-
-
-@cache
-def _environment() -> Environment:
-    return Environment(
-        loader=FileSystemLoader(_templates()),
-        trim_blocks=True,
-        lstrip_blocks=True,
-        undefined=StrictUndefined,
-        keep_trailing_newline=True,
-    )
-
-
-def _templates() -> Path:
-    """Inside an installed package, or at the top of a checkout."""
-    package = Path(__file__).resolve().parent.parent
-    installed = package / "templates"
-    return installed if installed.is_dir() else package.parent / "templates"
 
 
 def _background(scene: Scene) -> Expr:

@@ -26,8 +26,8 @@ STOPS = 16
 GAUSSIAN = math.pi / math.sqrt(3.0) / 10.0  # standard deviation of the edge's logistic profile, in falloffs
 TRACE = 768  # grid cells along the shortest side when a contour is traced
 MAX_CELLS = 2048  # grid cells along any side
-CHUNK = 1 << 20  # grid points × shapes computed at a time
-TOLERANCE = 0.15  # pixels that a traced contour may be simplified by
+CHUNK = 1 << 15  # grid points computed at a time: few enough that torch starts no threads for them
+TOLERANCE = 0.05  # pixels that a traced contour may be simplified by
 
 
 def svg(scene: Scene, options: Options) -> str:
@@ -241,7 +241,7 @@ def _distance_field(layer: Layer, x: np.ndarray, y: np.ndarray) -> np.ndarray:
     flat = [torch.tensor(v, dtype=torch.float64) for shape in layer.shapes for v in shape.parameters]
     columns = torch.from_numpy(x)[None, :]
     field = compile_torch([distance], inputs)
-    chunks = torch.from_numpy(y)[:, None].split(max(1, CHUNK // (len(x) * len(layer.shapes))))
+    chunks = torch.from_numpy(y)[:, None].split(max(1, CHUNK // len(x)))
     return np.concatenate([field(columns, rows, *flat)[0].numpy() for rows in chunks])
 
 

@@ -10,11 +10,11 @@ import numpy as np
 import torch
 
 from ..image import Picture, premultiply, resize
-from ..render.reference import composite
+from ..render.fused import composite, is_compiled, threads_of_its_own
 from ..render.tensors import SceneTensors, to_scene
 from ..scene import Scene
 from .constraints import project
-from .losses import total_loss
+from .losses import Objective, objective
 from .placing import place
 from .presets import DEFAULT, LENGTHS, PRESETS, RATES, Loss, Phase
 
@@ -56,7 +56,10 @@ def fit_picture(picture: Picture, settings: Settings, callback: Callback = lambd
     size = (picture.width / shortest, picture.height / shortest)
     start = scaled(pixels, phases[0].resolution)
     tensors = place(start, size, settings.kinds, settings.shapes, settings.compositing, generator)
-    optimise(tensors, pixels, phases, callback)
+    with threads_of_its_own():
+        if not is_compiled(tensors):
+            callback(Progress("compiling kernels (once)", 0, sum(phase.steps for phase in phases), math.nan))
+        optimise(tensors, pixels, phases, callback)
     return to_scene(tensors, picture.width, picture.height)
 
 
@@ -68,8 +71,9 @@ def optimise(tensors: SceneTensors, pixels: np.ndarray, phases: Sequence[Phase],
     done = 0
     for phase in phases:
         target = scaled(pixels, phase.resolution)
+        measure = objective(phase.loss, target)
         for rate in _rates(phase):
-            loss = _step(tensors, target, phase.loss, optimizer, rate)
+            loss = _step(tensors, target.shape, measure, optimizer, rate)
             project(tensors, pixel)
             done += 1
             if callback(Progress(phase.name, done, steps, loss)):
@@ -77,11 +81,15 @@ def optimise(tensors: SceneTensors, pixels: np.ndarray, phases: Sequence[Phase],
 
 
 def _step(
-    tensors: SceneTensors, target: torch.Tensor, loss: Loss, optimizer: torch.optim.Optimizer, rate: float
+    tensors: SceneTensors,
+    shape: torch.Size,
+    measure: Objective,
+    optimizer: torch.optim.Optimizer,
+    rate: float,
 ) -> float:
     optimizer.zero_grad(set_to_none=True)
-    channels, height, width = target.shape
-    value = total_loss(loss, composite(tensors, width, height)[:channels], target)
+    channels, height, width = shape
+    value = measure(composite(tensors, width, height, channels))
     value.backward()
     for group in optimizer.param_groups:
         group["lr"] = group["base_rate"] * rate

@@ -1,33 +1,40 @@
-"""Losses by name: each takes the render and the target, [C, H, W], and is 0 where they are equal."""
+"""Losses by name. Each is made for a target, [C, H, W], and then takes renders; 0 where they are equal."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import partial
 
 import torch
 
 from ..metrics import mse, ssim
 from .presets import Loss
+from .ssim import Dissimilarity
+
+Objective = Callable[[torch.Tensor], torch.Tensor]
 
 
-def l1(render: torch.Tensor, target: torch.Tensor) -> torch.Tensor:
+def l1(target: torch.Tensor) -> Objective:
     """Mean absolute difference."""
-    return (render - target).abs().mean()
+    return lambda render: (render - target).abs().mean()
 
 
-def dissimilarity(render: torch.Tensor, target: torch.Tensor) -> torch.Tensor:
+def squared(target: torch.Tensor) -> Objective:
+    """Mean squared difference."""
+    return partial(mse, target)
+
+
+def dissimilarity(target: torch.Tensor) -> Objective:
     """1 − SSIM."""
-    return 1.0 - ssim(render, target)
+    if target.device.type == "cpu" and target.dtype == torch.float32:
+        return Dissimilarity(target)
+    return lambda render: 1.0 - ssim(render, target)
 
 
-LOSSES: dict[str, Callable[[torch.Tensor, torch.Tensor], torch.Tensor]] = {
-    "l1": l1,
-    "mse": mse,
-    "ssim": dissimilarity,
-}
+LOSSES: dict[str, Callable[[torch.Tensor], Objective]] = {"l1": l1, "mse": squared, "ssim": dissimilarity}
 
 
-def total_loss(loss: Loss, render: torch.Tensor, target: torch.Tensor) -> torch.Tensor:
-    """The weighted sum of named losses."""
-    terms = [weight * LOSSES[name](render, target) for name, weight in loss]
-    return torch.stack(terms).sum()
+def objective(loss: Loss, target: torch.Tensor) -> Objective:
+    """The weighted sum of named losses, for one target."""
+    terms = [(weight, LOSSES[name](target)) for name, weight in loss]
+    return lambda render: torch.stack([weight * term(render) for weight, term in terms]).sum()

@@ -8,11 +8,13 @@ number of threads.
 from __future__ import annotations
 
 import os
+from collections.abc import Callable, Iterable, Iterator
 from concurrent.futures import ThreadPoolExecutor
+from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import cache
 from types import ModuleType
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 import torch
@@ -25,6 +27,8 @@ from .reference import canvas_axes
 from .tensors import Group, SceneTensors
 
 Floats = NDArray[np.float32]
+T = TypeVar("T")
+R = TypeVar("R")
 
 
 def composite(tensors: SceneTensors, width: int, height: int, channels: int = 4) -> torch.Tensor:
@@ -52,9 +56,20 @@ def kinds_of(tensors: SceneTensors) -> tuple[LayerKind, ...]:
     return tuple(LayerKind(group.kind, group.union_size) for group in tensors.groups)
 
 
-def prepare(tensors: SceneTensors) -> bool:
-    """Whether the kernels for this scene have yet to be compiled, which takes some seconds."""
-    return bool(tensors.groups) and not kernels.is_cached(kinds_of(tensors), tensors.compositing)
+def is_compiled(tensors: SceneTensors) -> bool:
+    """Whether the kernels for this scene are there; if not, the first render takes some seconds."""
+    return not tensors.groups or kernels.is_compiled(kinds_of(tensors), tensors.compositing)
+
+
+@contextmanager
+def threads_of_its_own() -> Iterator[None]:
+    """Torch on one thread meanwhile: its waiting threads would spin on the cores that the kernels need."""
+    before = torch.get_num_threads()
+    torch.set_num_threads(1)
+    try:
+        yield
+    finally:
+        torch.set_num_threads(before)
 
 
 def _rows(groups: list[Group], pixel: float) -> torch.Tensor:
@@ -120,7 +135,7 @@ class _Composite(torch.autograd.Function):
     """The kernels as one differentiable operation."""
 
     @staticmethod
-    def forward(  # type: ignore[override]
+    def forward(
         ctx: Any,
         canvas: _Canvas,
         channels: int,
@@ -148,7 +163,7 @@ class _Composite(torch.autograd.Function):
 
     @staticmethod
     @once_differentiable
-    def backward(ctx: Any, seed: torch.Tensor) -> tuple[torch.Tensor | None, ...]:  # type: ignore[override]
+    def backward(ctx: Any, seed: torch.Tensor) -> tuple[torch.Tensor | None, ...]:
         canvas, bins = ctx.canvas, ctx.bins
         uniforms = ctx.shared[4]
         row = uniforms.shape[1]
@@ -177,6 +192,11 @@ def _in_threads(function: Any, *arguments: Any) -> None:
         return
     for future in [_pool().submit(function, first, count, *arguments) for first in range(count)]:
         future.result()
+
+
+def in_threads_each(function: Callable[[T], R], items: Iterable[T]) -> list[R]:
+    """The function's results for all items, computed in the same threads that render."""
+    return list(map(function, items) if threads() == 1 else _pool().map(function, items))
 
 
 def threads() -> int:

@@ -1,31 +1,20 @@
-"""Compiled kernels for the fused renderer: their text, their compilation, their place on disk.
+"""The fused renderer's kernels: text generated from the same expressions as everything else.
 
-The text is generated from the same expressions as everything else and holds only the kinds of layer that a
-scene uses. It is written to the user's cache folder under a name made from the text and the versions of what
-compiles it; numba keeps the machine code beside it.
+A text holds only the kinds of layer that a scene uses.
 """
 
 from __future__ import annotations
 
-import hashlib
-import importlib.util
-import os
-import sys
-import warnings
 from functools import cache
-from pathlib import Path
 from types import ModuleType
 from typing import NamedTuple
 
-import numba
-import numpy as np
-
 from ..blend import COMPOSITING, coverage, reach, saturation, smooth_union, union_reach
-from ..errors import Sdf2vecError
 from ..expr import VEC2, VEC3, VEC4, Expr, components_of, maximum, minimum, scalarize, var
-from ..files import write_atomically
 from ..lower.numba import PREAMBLE, Block, backward, forward, scalar
 from ..shapes import KINDS
+from ..templating import template
+from . import compiled
 
 TILE = 16  # pixels along a side of a tile, the block that kernels work on
 PIXELS = TILE * TILE
@@ -98,7 +87,8 @@ def text(layers: tuple[LayerKind, ...], compositing: str) -> str:
                 formula.uniforms,
             ),
         ]
-    return "\n\n".join([*parts, _dispatch_text(layers), DRIVER])
+    driver = template("tiles.py.jinja").render(tile=TILE, pixels=PIXELS, farthest=(TILE - 1) / 2 * 2**0.5)
+    return "\n\n".join([*parts, _dispatch_text(layers), driver])
 
 
 def _blend_text(compositing: str) -> list[str]:
@@ -150,255 +140,12 @@ def _cases(name: str, arguments: str, cases: list[tuple[int, str]]) -> str:
     return "\n".join(["@njit(**OPTIONS)", f"def {name}(kind, {arguments}):", *lines, f"    {last}"]) + "\n"
 
 
-DRIVER = f'''\
-TILE, PIXELS = {TILE}, {PIXELS}
-FARTHEST = f32({(TILE - 1) / 2 * 2**0.5!r})  # pixels from the centre of a tile to its farthest pixel centre
-
-
-@njit(**OPTIONS)
-def measure(kinds, uniforms, x, y, pixel, columns, rows, limits, ranges):
-    """Bounds of every layer and the range of tiles it may touch; returns how many tiles that is in all."""
-    total = 0
-    for l in range(kinds.size):
-        low_x, low_y, high_x, high_y, outer, inner, slope = bounds(kinds[l], uniforms[l])
-        limits[l, 0], limits[l, 1], limits[l, 2] = outer, inner, slope
-        side = TILE * pixel
-        ranges[l, 0] = max(0, min(columns, floor((low_x - x[0]) / side + f32(0.03))))
-        ranges[l, 1] = max(0, min(rows, floor((low_y - y[0]) / side + f32(0.03))))
-        ranges[l, 2] = max(ranges[l, 0], min(columns, floor((high_x - x[0]) / side + f32(0.01)) + 1))
-        ranges[l, 3] = max(ranges[l, 1], min(rows, floor((high_y - y[0]) / side + f32(0.01)) + 1))
-        total += (ranges[l, 2] - ranges[l, 0]) * (ranges[l, 3] - ranges[l, 1])
-    return total
-
-
-@njit(**OPTIONS)
-def find_pairs(kinds, uniforms, x, y, pixel, columns, limits, ranges, tiles, layers, full):
-    """Pairs of a tile and a layer that covers some of it, in draw order; returns how many."""
-    count = 0
-    middle = f32((TILE - 1) * 0.5) * pixel
-    for l in range(kinds.size):
-        around = FARTHEST * pixel * limits[l, 2] * f32(1.001)
-        for row in range(ranges[l, 1], ranges[l, 3]):
-            for column in range(ranges[l, 0], ranges[l, 2]):
-                d = distance(kinds[l], uniforms[l], x[column * TILE] + middle, y[row * TILE] + middle)
-                if d - around < limits[l, 0]:
-                    tiles[count] = row * columns + column
-                    layers[count] = l
-                    full[count] = d + around < limits[l, 1]
-                    count += 1
-    return count
-
-
-@njit(**OPTIONS)
-def sort_pairs(count, tiles, layers, full, starts, sorted_layers, sorted_full):
-    """Groups the pairs by tile, keeping the draw order; `starts` is where each tile's begin."""
-    for i in range(count):
-        starts[tiles[i] + 1] += 1
-    for t in range(starts.size - 1):
-        starts[t + 1] += starts[t]
-    places = starts[:-1].copy()
-    for i in range(count):
-        place = places[tiles[i]]
-        sorted_layers[place], sorted_full[place] = layers[i], full[i]
-        places[tiles[i]] += 1
-
-
-@njit(**OPTIONS)
-def lowest_visible(start, end, layers, full, kinds, opacity, hides):
-    """The first pair of a tile that is not wholly hidden by an opaque one above it."""
-    if hides:
-        for q in range(end - 1, start, -1):
-            if full[q] and opacity[layers[q]] == ONE and not IS_UNION[kinds[layers[q]]]:
-                return q
-    return start
-
-
-@njit(**OPTIONS)
-def cover_layer(kind, is_full, u, x, y, cover, tint):
-    if is_full and not IS_UNION[kind]:
-        cover[:] = ONE
-    else:
-        layer(kind, u, x, y, cover, tint)
-
-
-@njit(**OPTIONS)
-def blend(channel, union, color, opacity, below, cover, tint, pair, out):
-    """Lays one channel of a layer on what is below."""
-    if channel == 3:
-        pair[0] = opacity
-        blend_alpha(pair, below, cover, out)
-    elif union:
-        pair[0] = opacity
-        blend_tint(pair, below, cover, tint[channel], out)
-    else:
-        pair[0], pair[1] = color[channel], opacity
-        blend_color(pair, below, cover, out)
-
-
-@njit(**OPTIONS)
-def forward_tiles(
-    first, step, starts, layers, full, kinds, uniforms, colors, opacity, background, hides, x, y, columns, image
-):
-    """Draws every step-th tile into image [C, H, W]."""
-    channels, height, width = image.shape
-    px, py = np.empty(PIXELS, f32), np.empty(PIXELS, f32)
-    cover, tint, pair = np.empty(PIXELS, f32), np.empty((3, PIXELS), f32), np.empty(2, f32)
-    below = np.empty((channels, PIXELS), f32)
-    for tile in range(first, starts.size - 1, step):
-        top, left = tile // columns * TILE, tile % columns * TILE
-        place_pixels(top, left, x, y, px, py)
-        for c in range(channels):
-            below[c, :] = background[c]
-        start = lowest_visible(starts[tile], starts[tile + 1], layers, full, kinds, opacity, hides)
-        for q in range(start, starts[tile + 1]):
-            l = layers[q]
-            cover_layer(kinds[l], full[q], uniforms[l], px, py, cover, tint)
-            for c in range(channels):
-                blend(c, IS_UNION[kinds[l]], colors[l], opacity[l], below[c], cover, tint, pair, below[c])
-        for r in range(min(TILE, height - top)):
-            for s in range(min(TILE, width - left)):
-                for c in range(channels):
-                    image[c, top + r, left + s] = below[c, r * TILE + s]
-
-
-@njit(**OPTIONS)
-def place_pixels(top, left, x, y, px, py):
-    for r in range(TILE):
-        for s in range(TILE):
-            px[r * TILE + s] = x[left + s]
-            py[r * TILE + s] = y[top + r]
-
-
-@njit(**OPTIONS)
-def backward_tiles(
-    first, step, starts, layers, full, kinds, uniforms, colors, opacity, background, hides, x, y, columns,
-    seed_image, longest, grads, background_grads
-):
-    """Derivatives of every step-th tile: a row of `grads` per pair (uniforms, colour, opacity)."""
-    channels, height, width = seed_image.shape
-    row = uniforms.shape[1]
-    px, py = np.empty(PIXELS, f32), np.empty(PIXELS, f32)
-    covers = np.empty((longest, PIXELS), f32)
-    belows = np.empty((longest + 1, channels, PIXELS), f32)
-    tints = np.empty((longest if ANY_UNION else 1, 3, PIXELS), f32)
-    seed, flow = np.empty((channels, PIXELS), f32), np.empty(PIXELS, f32)
-    cover_seed, tint_seed = np.empty(PIXELS, f32), np.empty((3, PIXELS), f32)
-    pair, pair_grad = np.empty(2, f32), np.empty(2, f32)
-    for tile in range(first, starts.size - 1, step):
-        top, left = tile // columns * TILE, tile % columns * TILE
-        place_pixels(top, left, x, y, px, py)
-        for c in range(channels):
-            belows[0, c, :] = background[c]
-        start = lowest_visible(starts[tile], starts[tile + 1], layers, full, kinds, opacity, hides)
-        for q in range(start, starts[tile + 1]):
-            l, k = layers[q], q - start
-            tint = tints[k % tints.shape[0]]
-            cover_layer(kinds[l], full[q], uniforms[l], px, py, covers[k], tint)
-            for c in range(channels):
-                blend(
-                    c, IS_UNION[kinds[l]], colors[l], opacity[l], belows[k, c], covers[k], tint, pair, belows[k + 1, c]
-                )
-        seed[:] = ZERO
-        for r in range(min(TILE, height - top)):
-            for s in range(min(TILE, width - left)):
-                for c in range(channels):
-                    seed[c, r * TILE + s] = seed_image[c, top + r, left + s]
-        for q in range(starts[tile + 1] - 1, start - 1, -1):
-            l, k = layers[q], q - start
-            union, grad = IS_UNION[kinds[l]], grads[q]
-            cover_seed[:] = ZERO
-            if union:
-                tint_seed[:] = ZERO
-            tint = tints[k % tints.shape[0]]
-            for c in range(channels):
-                flow[:] = ZERO
-                pair_grad[:] = ZERO
-                pair[0] = opacity[l]
-                if c == 3:
-                    blend_alpha_backward(pair, belows[k, c], covers[k], seed[c], flow, cover_seed, pair_grad)
-                    grad[row + 3] += pair_grad[0]
-                elif union:
-                    blend_tint_backward(
-                        pair, belows[k, c], covers[k], tint[c], seed[c], flow, cover_seed, tint_seed[c], pair_grad
-                    )
-                    grad[row + 3] += pair_grad[0]
-                else:
-                    pair[0], pair[1] = colors[l, c], opacity[l]
-                    blend_color_backward(pair, belows[k, c], covers[k], seed[c], flow, cover_seed, pair_grad)
-                    grad[row + c] += pair_grad[0]
-                    grad[row + 3] += pair_grad[1]
-                seed[c, :] = flow
-            if union or not full[q]:
-                layer_backward(kinds[l], uniforms[l], px, py, cover_seed, tint_seed, grad)
-        for c in range(channels):
-            for i in range(PIXELS):
-                background_grads[tile, c] += seed[c, i]
-
-
-@njit(**OPTIONS)
-def reduce_pairs(layers, grads, totals):
-    """Adds the pairs' derivatives up by layer, in a fixed order."""
-    for q in range(layers.size):
-        for i in range(grads.shape[1]):
-            totals[layers[q], i] += grads[q, i]
-'''
-
-
-# --- compiling ---------------------------------------------------------------------------------------------
-
-
 @cache
 def load(layers: tuple[LayerKind, ...], compositing: str) -> ModuleType:
-    """The compiled module for these kinds of layer; compiles on first use, from the cache folder later."""
-    source = text(layers, compositing)
-    path = kernel_path(source)
-    try:
-        if not path.exists():
-            write_atomically(path, source.replace("CACHE", "True", 1).encode())
-        return _import(path)
-    except (Sdf2vecError, OSError, RuntimeError) as error:
-        _warn_once(str(error))
-        module = ModuleType(path.stem)
-        exec(compile(source.replace("CACHE", "False", 1), str(path), "exec"), module.__dict__)
-        return module
+    """The compiled module for these kinds of layer."""
+    return compiled.load(text(layers, compositing))
 
 
-def is_cached(layers: tuple[LayerKind, ...], compositing: str) -> bool:
+def is_compiled(layers: tuple[LayerKind, ...], compositing: str) -> bool:
     """Whether these kernels have been compiled before on this machine."""
-    path = kernel_path(text(layers, compositing))
-    return any((path.parent / "__pycache__").glob(f"{path.stem}.backward_tiles*.nbi"))
-
-
-def kernel_path(source: str) -> Path:
-    """Where a module of this text is kept: the name is made from the text and the compilers' versions."""
-    versions = (numba.__version__, np.__version__, sys.version)
-    key = hashlib.sha256("\n".join((source, *versions)).encode()).hexdigest()[:20]
-    return cache_folder() / f"kernels_{key}.py"
-
-
-def cache_folder() -> Path:
-    """`$SDF2VEC_CACHE`, or the user's cache folder as the system has it."""
-    if own := os.environ.get("SDF2VEC_CACHE"):
-        return Path(own)
-    if sys.platform == "win32":
-        return Path(os.environ.get("LOCALAPPDATA", Path.home() / "AppData" / "Local")) / "sdf2vec"
-    if sys.platform == "darwin":
-        return Path.home() / "Library" / "Caches" / "sdf2vec"
-    return Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache") / "sdf2vec"
-
-
-def _import(path: Path) -> ModuleType:
-    spec = importlib.util.spec_from_file_location(path.stem, path)
-    assert spec is not None
-    assert spec.loader is not None
-    module = importlib.util.module_from_spec(spec)
-    sys.modules[path.stem] = module
-    spec.loader.exec_module(module)
-    return module
-
-
-@cache
-def _warn_once(reason: str) -> None:
-    warnings.warn(
-        f"kernels are compiled anew each time: no cache folder ({reason})", RuntimeWarning, stacklevel=3
-    )
+    return compiled.is_compiled(text(layers, compositing), "backward_tiles")

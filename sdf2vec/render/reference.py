@@ -73,8 +73,7 @@ def canvas_axes(
     sizes = [torch.tensor(value, dtype=torch.float64) for value in (width, height, *tensors.size)]
     places = torch.arange(max(columns, rows), dtype=torch.float64) + 0.5
     x, y, pixel = _canvas()(places, places, *sizes)
-    axes = (axis.numpy().astype(np.float32) for axis in (x[:columns], y[:rows]))
-    return (*axes, np.float32(pixel))
+    return x[:columns].numpy().astype(np.float32), y[:rows].numpy().astype(np.float32), np.float32(pixel)
 
 
 def _composite(tensors: SceneTensors, x: torch.Tensor, y: torch.Tensor, pixel: torch.Tensor) -> torch.Tensor:

@@ -1,0 +1,70 @@
+"""1 − SSIM as a loss: the same number as `metrics.ssim`, with a derivative of its own, many times faster."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import torch
+from numpy.typing import NDArray
+from torch.autograd.function import once_differentiable
+
+from ..metrics import gaussian_window
+from ..render import compiled
+from ..render.fused import in_threads_each
+
+Floats = NDArray[np.float32]
+
+
+class Dissimilarity:
+    """1 − SSIM against a fixed target, [C, H, W]; its local means are computed once."""
+
+    def __init__(self, target: torch.Tensor) -> None:
+        self.kernels = compiled.load(Path(__file__).with_name("ssim_kernels.py").read_text())
+        self.target: Floats = np.ascontiguousarray(target.numpy(), dtype=np.float32)
+        height, width = self.target.shape[1:]
+        self.across, self.down = (
+            gaussian_window(side).numpy().astype(np.float32) for side in (width, height)
+        )
+        self.mean = np.stack([self._smooth(channel) for channel in self.target])
+        self.square = np.stack([self._smooth(channel * channel) for channel in self.target])
+
+    def _smooth(self, channel: Floats) -> Floats:
+        height, width = channel.shape
+        rows = np.empty((height, width - len(self.across) + 1), np.float32)
+        out = np.empty((height - len(self.down) + 1, rows.shape[1]), np.float32)
+        self.kernels.smooth(channel, self.across, self.down, rows, out)
+        return out
+
+    def __call__(self, render: torch.Tensor) -> torch.Tensor:
+        value: torch.Tensor = _Function.apply(self, render)
+        return value
+
+    def value_and_gradient(self, render: Floats) -> tuple[float, Floats]:
+        """1 − SSIM and its derivative by the render."""
+        grad = np.empty_like(render)
+
+        def channel(c: int) -> float:
+            return float(
+                self.kernels.similarity(
+                    render[c], self.target[c], self.mean[c], self.square[c], self.across, self.down, grad[c]
+                )
+            )
+
+        total = sum(in_threads_each(channel, range(len(render))))
+        grad *= np.float32(-1.0 / self.mean.size)
+        return 1.0 - total / self.mean.size, grad
+
+
+class _Function(torch.autograd.Function):
+    @staticmethod
+    def forward(ctx: Any, loss: Dissimilarity, render: torch.Tensor) -> torch.Tensor:
+        pixels = np.ascontiguousarray(render.detach().numpy(), dtype=np.float32)
+        value, ctx.gradient = loss.value_and_gradient(pixels)
+        return torch.tensor(value, dtype=torch.float32)
+
+    @staticmethod
+    @once_differentiable
+    def backward(ctx: Any, seed: torch.Tensor) -> tuple[None, torch.Tensor]:
+        return None, torch.from_numpy(ctx.gradient) * seed

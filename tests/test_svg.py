@@ -1,0 +1,340 @@
+"""SVG: well-formed by an independent parser, and the render's picture when resvg draws it."""
+
+import math
+import re
+from xml.etree import ElementTree
+
+import numpy as np
+import pytest
+import torch
+from skimage.morphology import dilation, footprint_rectangle
+
+from sdf2vec import KINDS, Layer, Scene, Sdf2vecError, Shape
+from sdf2vec.engines import ENGINES
+from sdf2vec.export.options import Options
+from sdf2vec.export.svg import svg as write_svg
+from sdf2vec.image import premultiply
+from sdf2vec.render.reference import render
+
+from .scenes import random_scene
+
+NAMESPACE = "{http://www.w3.org/2000/svg}"
+Parameters = dict[str, float | tuple[float, ...]]
+WHITE, BLACK, ORANGE = (1.0, 1.0, 1.0), (0.0, 0.0, 0.0), (1.0, 0.6, 0.0)
+
+
+def scene_of(*layers, width=150, height=100, background=BLACK):
+    return Scene(width, height, layers, background)
+
+
+def circle(x, y, radius, color=WHITE, falloff=0.2, opacity=1.0):
+    return Layer((Shape.of("circle", color, center=(x, y), radius=radius),), falloff, opacity)
+
+
+def triangle(*points, falloff=0.0, color=WHITE):
+    return Layer((Shape.of("triangle", color, a=points[0], b=points[1], c=points[2]),), falloff)
+
+
+def text_of(scene, **options):
+    return write_svg(scene, Options(**options))
+
+
+def parsed(scene, **options):
+    return ElementTree.fromstring(text_of(scene, **options))
+
+
+def tags(root):
+    return [element.tag.removeprefix(NAMESPACE) for element in root.iter()]
+
+
+def numbers_of(path_data):
+    return [float(number) for number in re.findall(r"-?\d+(?:\.\d+)?(?:e-?\d+)?", path_data)]
+
+
+@pytest.fixture
+def levels_off(require_engine):
+    """Differences in levels of 255, [H, W, 4], between resvg's drawing and the render, both premultiplied."""
+    require_engine("resvg")
+
+    def difference(scene, width=None, height=None):
+        width, height = width or scene.width, height or scene.height
+        drawn = premultiply(ENGINES["resvg"].render(text_of(scene), width, height))
+        expected = render(scene, width, height, dtype=torch.float64).permute(1, 2, 0).numpy()
+        return 255 * np.abs(drawn - expected)
+
+    return difference
+
+
+def away_from_edges(scene, falloff_pixels=3):
+    """Pixels [H, W] whose neighbourhood a sharp scene leaves in one colour."""
+    image = render(scene).numpy()
+    edge = np.zeros(image.shape[1:], bool)
+    for axis in (1, 2):
+        change = np.abs(np.diff(image, axis=axis)).max(axis=0) > 1e-3
+        edge |= np.pad(change, [(0, 1), (0, 0)] if axis == 1 else [(0, 0), (0, 1)])
+    return ~dilation(edge, footprint_rectangle((falloff_pixels, falloff_pixels)))
+
+
+# --- the document ------------------------------------------------------------------------------------------
+
+
+def test_the_root_says_size_and_role():
+    root = parsed(random_scene(layers=10, width=60, height=40))
+    assert root.tag == f"{NAMESPACE}svg"
+    assert (root.get("width"), root.get("height")) == ("60", "40")
+    assert root.get("viewBox") == "0 0 60 40"
+    assert root.get("role") == "img"
+
+
+@pytest.mark.parametrize("title", ["photo.jpg", "<a> & \"b\" 'c' ]]> <!-- &amp;", "Blüte 花.png", ""])
+def test_title_is_escaped(title):
+    (element,) = parsed(scene_of(), title=title).findall(f"{NAMESPACE}title")
+    assert (element.text or "").strip("'") == title.strip("'")
+
+
+@pytest.mark.parametrize("title", ["a\0b", "two\nlines", "\ud800", "\ufffe"])
+def test_titles_that_xml_cannot_hold(title):
+    text = text_of(scene_of(), title=title)
+    (element,) = ElementTree.fromstring(text.encode()).findall(f"{NAMESPACE}title")
+    assert element.text
+    assert element.text.isprintable()
+
+
+@pytest.mark.parametrize("transparent", [False, True])
+def test_ids_are_unique_and_references_lead_somewhere(transparent):
+    root = parsed(random_scene(layers=20, seed=1, transparent=transparent))
+    ids = [element.get("id") for element in root.iter() if element.get("id")]
+    assert len(ids) > 5
+    assert len(set(ids)) == len(ids)
+    used = [
+        name
+        for element in root.iter()
+        for value in element.attrib.values()
+        for name in re.findall(r"url\(#(\w+)\)", value)
+    ]
+    assert set(used) == set(ids)
+
+
+def test_same_scene_same_text():
+    assert text_of(random_scene(seed=3)) == text_of(random_scene(seed=3))
+    assert text_of(random_scene(seed=3)) != text_of(random_scene(seed=4))
+
+
+def test_no_layers():
+    root = parsed(scene_of(background=ORANGE))
+    assert tags(root) == ["svg", "title", "defs", "rect"]
+    assert root[-1].get("fill") == "#ff9900"
+    assert "rect" not in tags(parsed(scene_of(background=None)))
+
+
+def test_layers_come_in_draw_order():
+    colors = [(i / 15, 0.0, 0.0) for i in range(16)]
+    root = parsed(scene_of(*(circle(i / 20, 0, 0.1, color, falloff=0) for i, color in enumerate(colors))))
+    fills = [element.get("fill") for element in root.iter(f"{NAMESPACE}circle")]
+    assert fills == [f"#{17 * i:02x}0000" for i in range(16)]
+
+
+def test_additive_is_refused_in_one_line():
+    with pytest.raises(Sdf2vecError, match=r"^svg: additive scenes .* --compositing over$"):
+        text_of(Scene(3, 2, (), compositing="additive"))
+
+
+def test_all_numbers_are_finite_and_plain():
+    text = text_of(random_scene(layers=25, seed=2))
+    assert not re.search(r"\b(nan|inf)\b", text, re.IGNORECASE)
+
+
+# --- sharp shapes: the very elements, with coordinates by hand ----------------------------------------------
+
+
+def test_a_sharp_circle_is_a_circle():
+    (element,) = parsed(scene_of(circle(0.1, -0.2, 0.25, ORANGE, falloff=0, opacity=0.5)))[3:]
+    assert element.tag == f"{NAMESPACE}circle"
+    place = {name: float(element.get(name, "nan")) for name in ("cx", "cy", "r", "fill-opacity")}
+    assert place == {"cx": 85, "cy": 30, "r": 25, "fill-opacity": 0.5}
+    assert element.get("fill") == "#ff9900"
+
+
+def test_a_sharp_falloff_moves_the_edge_by_half_of_it():
+    (element,) = parsed(scene_of(circle(0, 0, 0.25, falloff=0.01)))[3:]
+    assert float(element.get("r", "nan")) == pytest.approx(25.5)
+
+
+def test_a_sharp_box_is_a_turned_rectangle():
+    numbers: Parameters = {
+        "center": (0, 0.1),
+        "half_size": (0.3, 0.2),
+        "angle": math.pi / 6,
+        "corner_radius": 0.05,
+    }
+    (element,) = parsed(scene_of(Layer((Shape.of("box", WHITE, **numbers),), 0)))[3:]
+    assert element.tag == f"{NAMESPACE}rect"
+    place = {name: float(element.get(name, "nan")) for name in ("x", "y", "width", "height", "rx")}
+    assert place == {"x": 45, "y": 40, "width": 60, "height": 40, "rx": 5}
+    assert numbers_of(element.get("transform", "")) == pytest.approx([30, 75, 60])
+
+
+def test_a_sharp_triangle_is_a_polygon():
+    (element,) = parsed(scene_of(triangle((0, -0.4), (0.3, 0.2), (-0.3, 0.2))))[3:]
+    assert element.tag == f"{NAMESPACE}polygon"
+    assert numbers_of(element.get("points", "")) == [75, 10, 105, 70, 45, 70]
+
+
+@pytest.mark.parametrize(
+    "points", [[(0, -0.4), (0.3, 0.2), (-0.3, 0.2)], [(0, -0.4), (-0.3, 0.2), (0.3, 0.2)]]
+)
+def test_rounded_triangles_grow_outwards_whatever_their_orientation(points):
+    """1 pixel of falloff moves the edges out by half a pixel: the topmost point to 9.5, the lowest to 70.5."""
+    (element,) = parsed(scene_of(triangle(*points, falloff=0.01)))[3:]
+    assert element.tag == f"{NAMESPACE}path"
+    data = element.get("d", "")
+    assert data.count("A0.5 0.5 0 0 1") == 3
+    places = numbers_of(data.replace("A0.5 0.5 0 0 1", ""))
+    x, y = np.array(places[0::2]), np.array(places[1::2])
+    assert y.max() == pytest.approx(70.5, abs=0.011)
+    center = np.array([75, 50])
+    corners = np.array([[75, 10], [105, 70], [45, 70]])
+    spokes = np.hypot(x - center[0], y - center[1])
+    assert spokes.min() > np.hypot(*(corners - center).T).min()
+
+
+def test_coordinates_of_small_pictures_have_more_decimals():
+    """A drawing of 1 × 1 pixel is shown at any size, so its coordinates can't be whole hundredths."""
+    (element,) = parsed(scene_of(circle(0.1234, 0, 0.0567, falloff=0), width=1, height=1))[3:]
+    assert float(element.get("cx", "nan")) == pytest.approx(0.6234, abs=1e-4)
+    assert float(element.get("r", "nan")) == pytest.approx(0.0567, abs=1e-4)
+
+
+# --- as resvg draws it -------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("background", [(0.2, 0.3, 0.4), None], ids=["opaque", "transparent"])
+@pytest.mark.parametrize("falloff", [0.05, 0.3, 1.5])
+def test_soft_circles_are_gradients_that_say_the_coverage(levels_off, falloff, background):
+    layers = [
+        circle(-0.3, 0.1, 0.2, ORANGE, falloff, 0.8),
+        circle(0.2, -0.1, 0.35, (0.1, 0.9, 0.3), falloff),
+        circle(0.6, 0.3, 0.01, (0.9, 0.1, 0.9), falloff, 0.9),
+    ]
+    for layer in layers:
+        scene = scene_of(layer, background=background)
+        assert levels_off(scene).max() <= 3
+        assert levels_off(scene, 300, 200).max() <= 3
+    scene = scene_of(*layers, background=background)
+    root = parsed(scene)
+    assert len(root.findall(f".//{NAMESPACE}radialGradient")) == 3
+    assert "filter" not in tags(root)
+    assert levels_off(scene).max() <= 5
+
+
+def test_soft_ellipses_too(levels_off):
+    shape = Shape.of("ellipse", ORANGE, center=(0.1, 0.05), radii=(0.5, 0.15), angle=0.7)
+    scene = scene_of(Layer((shape,), 0.1, 0.9))
+    assert "filter" not in tags(parsed(scene))
+    assert levels_off(scene).max() <= 3
+
+
+SHARP: dict[str, Parameters] = {
+    "circle": {"center": (0.1, 0), "radius": 0.3},
+    "ellipse": {"center": (0.1, 0), "radii": (0.5, 0.2), "angle": 0.5},
+    "box": {"center": (0.1, 0), "half_size": (0.5, 0.2), "angle": 0.5, "corner_radius": 0.1},
+    "triangle": {"a": (0, -0.4), "b": (0.5, 0.3), "c": (-0.4, 0.2)},
+    "displaced": {"center": (0, 0), "radius": 0.3, "amplitude": 0.1, "frequency": (12, 9)},
+}
+
+
+@pytest.mark.parametrize("falloff", [0.0, 0.01])
+@pytest.mark.parametrize("kind", sorted(KINDS))
+def test_sharp_shapes_away_from_their_edges(levels_off, kind, falloff):
+    scene = scene_of(Layer((Shape.of(kind, ORANGE, **SHARP[kind]),), falloff, 0.8), background=(0.2, 0, 0.5))
+    inner = away_from_edges(scene)
+    assert 0.5 < inner.mean() < 0.99
+    off = levels_off(scene)
+    assert off[inner].max() <= 1
+    assert off.max() < 45  # an edge in the wrong place by half a pixel would be off by 102
+
+
+def test_sharp_unions_are_traced(levels_off):
+    shapes = tuple(Shape.of("circle", ORANGE, center=(x, 0.0), radius=0.2) for x in (-0.2, 0.2))
+    scene = scene_of(Layer(shapes, 0.0, 1.0, 0.05))
+    assert len(parsed(scene).findall(f".//{NAMESPACE}path")) == 1
+    off = levels_off(scene)
+    assert off[away_from_edges(scene)].max() <= 1
+    assert off.max() < 40
+
+
+def test_a_union_around_a_hole(levels_off):
+    ring = [
+        Shape.of("circle", WHITE, center=(0.3 * math.cos(a), 0.3 * math.sin(a)), radius=0.08)
+        for a in np.arange(0, 6.2, 0.4)
+    ]
+    scene = scene_of(Layer(tuple(ring), 0.0, 1.0, 0.01))
+    assert levels_off(scene)[50, 75, :3].max() == 0
+    assert levels_off(scene)[away_from_edges(scene)].max() <= 1
+
+
+@pytest.mark.parametrize("kind", ["box", "triangle", "displaced"])
+def test_soft_edges_by_blurring_are_near(levels_off, kind):
+    """A Gaussian is not the logistic curve, and corners differ more: so only near, and nearer on average."""
+    scene = scene_of(Layer((Shape.of(kind, WHITE, **SHARP[kind]),), 0.08))
+    assert parsed(scene).findall(f".//{NAMESPACE}feGaussianBlur")
+    assert levels_off(scene).max() < 45
+    assert levels_off(scene).mean() < 2.5
+
+
+def test_a_traced_shape_larger_than_the_canvas(levels_off):
+    """Only what can be seen is traced: neither the memory nor the time grows with the shape."""
+    numbers: Parameters = {"center": (0, 30), "radius": 30, "amplitude": 0.05, "frequency": (20, 20)}
+    sharp = scene_of(Layer((Shape.of("displaced", ORANGE, **numbers),), 0.0))
+    assert levels_off(sharp)[away_from_edges(sharp)].max() <= 1
+    everywhere: Parameters = {"center": (0, 0), "radius": 1000, "amplitude": 0.05, "frequency": (20, 20)}
+    for falloff in (0.0, 0.3):
+        filled = scene_of(Layer((Shape.of("displaced", ORANGE, **everywhere),), falloff))
+        assert levels_off(filled).max() <= 1
+    nowhere: Parameters = {"center": (500, 0), "radius": 10, "amplitude": 0.05, "frequency": (20, 20)}
+    assert "path" not in tags(parsed(scene_of(Layer((Shape.of("displaced", ORANGE, **nowhere),), 0.1))))
+
+
+@pytest.mark.parametrize(
+    "points",
+    [
+        [(-0.3, 0), (0.3, 0), (-0.3, 0)],
+        [(-0.3, 0), (-0.3, 0), (0.3, 0)],
+        [(0.3, 0), (-0.3, 0), (0, 0)],
+        [(-0.3, 0), (0, 0), (0.3, 0)],
+    ],
+)
+def test_triangles_without_area_are_drawn_as_lines(points):
+    """The distance to a segment: at falloff f its outline is a stadium of radius f / 2, half a pixel here."""
+    (element,) = parsed(scene_of(triangle(*points, falloff=0.015)))[3:]
+    arcs = re.findall(r"A0\.75 0\.75 0 0 1 (\S+) ([^LZ]+)", element.get("d", ""))
+    ends = {(float(x), round(float(y), 2)) for x, y in arcs if abs(float(x) - 75) > 1}
+    assert ends == {(45.0, 49.25), (105.0, 50.75)} or ends == {(45.0, 49.25), (105.0, 49.25), (105.0, 50.75)}
+
+
+def test_a_point_of_a_triangle_is_no_error():
+    parsed(scene_of(triangle((0, 0), (0, 0), (0, 0), falloff=0.015)))
+    parsed(scene_of(triangle((0, 0), (0, 0), (0, 0), falloff=0.5)))
+
+
+def test_a_mixed_scene(levels_off):
+    """Without unions, whose colours are averaged, and without opacity where outlines cross."""
+    kept = [layer for layer in random_scene(layers=20, seed=5).layers if len(layer.shapes) == 1]
+    assert {layer.kind for layer in kept} == set(KINDS)
+    assert levels_off(Scene(120, 80, tuple(kept), ORANGE)).mean() < 1.5
+
+
+@pytest.mark.parametrize("size", [(1, 1), (1, 40), (40, 1)])
+def test_thin_canvases(levels_off, size):
+    width, height = size
+    scene = Scene(width, height, (circle(0, 0, 0.4, ORANGE, falloff=2),), BLACK)
+    root = parsed(scene)
+    assert root.get("viewBox") == f"0 0 {width} {height}"
+    assert levels_off(scene, 20 * width, 20 * height).max() <= 3
+
+
+def test_smaller_than_any_pixel():
+    shape = Shape.of("ellipse", WHITE, center=(0, 0), radii=(1e-6, 1e-6), angle=0)
+    for falloff in (0.0, 0.1, 64.0):
+        root = parsed(scene_of(Layer((shape,), falloff), width=1, height=1))
+        assert len(root) == 4
