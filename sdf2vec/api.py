@@ -50,7 +50,8 @@ def fit(
     picture = image if isinstance(image, Picture) else _load_picture(image)
     from .fit.loop import Settings, fit_picture
 
-    settings = Settings(shapes, kinds, compositing, preset, ((loss, 1.0),) if loss else None, seed)
+    weighted = ((loss, 1.0),) if loss else None
+    settings = Settings(int(shapes), kinds, compositing, preset, weighted, int(seed))
     return fit_picture(picture, settings, callback or (lambda progress: False))
 
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import argparse
-import os
 import signal
 import sys
 import time
@@ -18,7 +17,7 @@ from . import __version__, api
 from .errors import Sdf2vecError
 from .export import EXPORTERS
 from .export.options import GLSL_VERSIONS, LAYOUTS, Options
-from .files import one_line, write_atomically
+from .files import one_line, require_writable, write_atomically
 from .fit.presets import DEFAULT, PRESETS
 from .image import Picture, load
 from .scene import Scene
@@ -49,21 +48,14 @@ def main(argv: Sequence[str] | None = None) -> NoReturn:
         _complain("interrupted")
         sys.exit(INTERRUPTED)
     except BrokenPipeError:  # whoever reads standard output has seen enough
-        _drop_output()
         sys.exit(OK)
     except OSError as error:
         _complain(f"{error.filename or 'standard output'}: {error.strerror or error}")
-        _drop_output()
         sys.exit(FAILED)
 
 
 def _complain(message: str) -> None:
     print(f"sdf2vec: {one_line(message)}", file=sys.stderr)
-
-
-def _drop_output() -> None:
-    """Python writes what is left in its buffers when it ends, and would fail once more."""
-    os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
 
 
 class _Parser(argparse.ArgumentParser):
@@ -228,7 +220,7 @@ def _name(source: str) -> str:
 
 
 def _write_exports(scene: Scene, job: _Job, options: argparse.Namespace, say: Callable[[str], None]) -> None:
-    title = "a picture" if job.source == STREAM else one_line(Path(job.source).name)
+    title = "a picture" if job.source == STREAM else one_line(_stem(job.source))
     for target, path in job.outputs.items():
         data = api.export(
             scene, target, size=options.size, glsl=options.glsl, layout=options.layout, title=title
@@ -278,7 +270,7 @@ def _targets(emit: list[str] | None, default: str) -> list[str]:
 
 
 def _plan(inputs: list[str], targets: list[str], output: str | None) -> list[_Job]:
-    """Which file each export goes to. Raises Sdf2vecError when two would share one or an input be overwritten."""
+    """Which file each export goes to. Raises Sdf2vecError when two would share one, or one can't be written."""
     single = len(inputs) == len(targets) == 1
     if output == STREAM and not single:
         raise Sdf2vecError("standard output takes one input and one target; give a folder with -o")
@@ -302,6 +294,7 @@ def _claim(path: str, source: str, taken: dict[str, str], sources: set[str]) -> 
             f"{path}: both {taken[resolved]} and {source} would be written there; convert them apart"
         )
     taken[resolved] = source
+    require_writable(path)
 
 
 def _outputs(source: str, targets: list[str], output: str | None, single: bool) -> dict[str, str]:
@@ -312,9 +305,15 @@ def _outputs(source: str, targets: list[str], output: str | None, single: bool) 
         return {targets[0]: output}
     if folder.exists() and not folder.is_dir():
         raise Sdf2vecError(f"{output}: is a file, but a folder is needed for several outputs")
-    stem = "picture" if source == STREAM else Path(source).name.removesuffix(".scene.json")
-    stem = Path(stem).stem if source != STREAM and not source.endswith(".scene.json") else stem
-    return {target: str(folder / f"{stem}{EXPORTERS[target].suffix}") for target in targets}
+    return {target: str(folder / f"{_stem(source)}{EXPORTERS[target].suffix}") for target in targets}
+
+
+def _stem(source: str) -> str:
+    """What outputs are named after: the same for a picture and for the scene file that was made of it."""
+    if source == STREAM:
+        return "picture"
+    name = Path(source).name
+    return name.removesuffix(".scene.json") if name.endswith(".scene.json") else Path(name).stem
 
 
 # --- progress and interruption ------------------------------------------------------------------------------
@@ -388,8 +387,9 @@ def _speaker(quiet: bool, to_stderr: bool) -> Callable[[str], None]:
 def _read_scene(source: str) -> Scene:
     if source != STREAM:
         return load_scene(source)
+    text = _standard_input().read()
     try:
-        return loads_scene(_standard_input().read())
+        return loads_scene(text)
     except Sdf2vecError as error:
         raise Sdf2vecError(f"standard input: {error}") from None
 

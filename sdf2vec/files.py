@@ -36,7 +36,29 @@ def write_atomically(path: str | os.PathLike[str], data: bytes) -> None:
             target.parent.mkdir(parents=True, exist_ok=True)
             _write_and_rename(target, data)
     except (OSError, ValueError) as error:  # ValueError: a NUL character in the path
-        raise Sdf2vecError(f"{one_line(os.fspath(path))}: {_reason(error)}; choose another place") from error
+        raise _refusal(path, error) from error
+
+
+def require_writable(path: str | os.PathLike[str]) -> None:
+    """Raises Sdf2vecError where `write_atomically` is bound to fail: before hours of work, say. Writes nothing."""
+    try:
+        target = Path(os.path.realpath(path))
+        if target.is_dir():
+            raise IsADirectoryError
+        if not target.exists() or target.is_file():
+            _require_folder(target.parent)
+    except (OSError, ValueError) as error:
+        raise _refusal(path, error) from error
+
+
+def _require_folder(folder: Path) -> None:
+    """That files can be made in a folder, or in the nearest one above it that exists."""
+    while not folder.exists():
+        folder = folder.parent
+    if not folder.is_dir():
+        raise NotADirectoryError
+    if not os.access(folder, os.W_OK | os.X_OK):
+        raise PermissionError
 
 
 def one_line(text: str) -> str:
@@ -55,6 +77,10 @@ def _write_and_rename(target: Path, data: bytes) -> None:
     finally:
         with contextlib.suppress(FileNotFoundError):
             beside.unlink()
+
+
+def _refusal(path: str | os.PathLike[str], error: Exception) -> Sdf2vecError:
+    return Sdf2vecError(f"{one_line(os.fspath(path))}: {_reason(error)}; choose another place")
 
 
 def _reason(error: Exception) -> str:

@@ -37,7 +37,7 @@ class SceneError(Sdf2vecError):
     """A malformed scene; `path` names the field, as in `layers[12].radius`."""
 
     def __init__(self, path: str, problem: str) -> None:
-        super().__init__(one_line(f"{path}: {problem}" if path else problem))
+        super().__init__(f"{path}: {problem}" if path else problem)
         self.path = path
         self.problem = problem
 

@@ -5,6 +5,8 @@ import random
 from sdf2vec import Layer, Scene, Shape
 from sdf2vec.shapes import KINDS
 
+ANY_UNION = dict.fromkeys(KINDS, (2, 3))
+
 
 def random_shape(kind: str, r: random.Random, lowest: float = 0.0) -> Shape:
     color = (r.uniform(lowest, 1), r.uniform(lowest, 1), r.uniform(lowest, 1))
@@ -36,12 +38,13 @@ def random_scene(
     width: int = 60,
     height: int = 40,
     transparent: bool = False,
+    unions: dict[str, tuple[int, ...]] = ANY_UNION,
 ) -> Scene:
-    """A scene in which every third layer is a union of two or three shapes."""
+    """A scene in which every third layer is a union, of as many shapes as `unions` allows for its kind."""
     r = random.Random(seed)
-    made = [
-        random_layer(kinds[i % len(kinds)], r, compositing, r.choice([2, 3]) if i % 3 == 2 else 1)
-        for i in range(layers)
-    ]
+    made = []
+    for i in range(layers):
+        kind = kinds[i % len(kinds)]
+        made.append(random_layer(kind, r, compositing, r.choice(unions.get(kind, (1,))) if i % 3 == 2 else 1))
     background = None if transparent else (r.random(), r.random(), r.random())
     return Scene(width, height, tuple(made), background, compositing)

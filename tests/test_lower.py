@@ -7,9 +7,11 @@ import pytest
 import torch
 
 from sdf2vec.engines import ENGINES
-from sdf2vec.expr import FLOAT, OPERATIONS, VEC2, const, function, let, select, sigmoid, var, vec2
+from sdf2vec.expr import FLOAT, OPERATIONS, VEC2, const, function, let, scalarize, select, sigmoid, var, vec2
+from sdf2vec.lower import numba as numba_lowering
 from sdf2vec.lower.shader import GLSL, WGSL, definition, expression, literal, statements, used_functions
 from sdf2vec.lower.torch import compile_torch, source
+from sdf2vec.render import compiled
 
 from .operations import MEANINGS, expected
 
@@ -66,6 +68,35 @@ def test_torch(name, dtype, tolerance):
     size = np.abs(cases).max(axis=1) if name in ("add", "sub", "mix", "dot") else 1.0
     scale = size**2 if name == "dot" else size
     assert (np.abs(got - want) <= tolerance * np.maximum(np.abs(want), scale)).all()
+
+
+@pytest.fixture(scope="module")
+def numba_operations():
+    """One module with a forward block for every operation."""
+    size = max(len(meaning.cases) for meaning in MEANINGS.values())
+    blocks = {}
+    for name, meaning in MEANINGS.items():
+        inputs = tuple(ARGUMENTS[: meaning.arity])
+        outputs = scalarize(meaning.build(*inputs))
+        blocks[name] = numba_lowering.forward(numba_lowering.Block(f"op_{name}", outputs, inputs, ()), size)
+    return compiled.load("\n\n".join([numba_lowering.PREAMBLE, *blocks.values()])), size
+
+
+@pytest.mark.parametrize("name", OPERATIONS)
+def test_numba(name, numba_operations):
+    module, size = numba_operations
+    meaning = MEANINGS[name]
+    cases = np.array(meaning.cases, dtype=np.float32)
+    repeated = np.resize(cases, (size, meaning.arity))
+    outputs = [
+        np.empty(size, np.float32) for _ in range(meaning.build(*ARGUMENTS[: meaning.arity]).type.width)
+    ]
+    columns = [np.ascontiguousarray(column) for column in repeated.T]
+    getattr(module, f"op_{name}")(np.empty(0, np.float32), *columns, *outputs)
+    got, want = np.stack(outputs)[:, : len(cases)], expected(meaning, cases)
+    size_of = np.abs(cases).max(axis=1) if name in ("add", "sub", "mix", "dot") else 1.0
+    scale = np.maximum(np.abs(want), size_of**2 if name == "dot" else size_of)
+    assert (np.abs(got - want) <= 2e-5 * scale).all()
 
 
 @pytest.mark.parametrize(("engine", "dialect"), [("opengl", GLSL), ("webgpu", WGSL)])

@@ -26,7 +26,7 @@ STOPS = 16
 GAUSSIAN = math.pi / math.sqrt(3.0) / 10.0  # standard deviation of the edge's logistic profile, in falloffs
 TRACE = 768  # grid cells along the shortest side when a contour is traced
 MAX_CELLS = 2048  # grid cells along any side
-CHUNK = 1 << 15  # grid points computed at a time: few enough that torch starts no threads for them
+CHUNK = 1 << 15  # grid points computed at a time
 TOLERANCE = 0.05  # pixels that a traced contour may be simplified by
 
 
@@ -231,6 +231,7 @@ def _distance_field(layer: Layer, x: np.ndarray, y: np.ndarray) -> np.ndarray:
     import torch
 
     from ..lower.torch import compile_torch
+    from ..render.fused import threads_of_its_own
 
     p = var("p", VEC2)
     kind = KINDS[layer.kind]
@@ -242,7 +243,8 @@ def _distance_field(layer: Layer, x: np.ndarray, y: np.ndarray) -> np.ndarray:
     columns = torch.from_numpy(x)[None, :]
     field = compile_torch([distance], inputs)
     chunks = torch.from_numpy(y)[:, None].split(max(1, CHUNK // len(x)))
-    return np.concatenate([field(columns, rows, *flat)[0].numpy() for rows in chunks])
+    with threads_of_its_own():  # on such small pieces a second one mostly waits, for long when it has no core
+        return np.concatenate([field(columns, rows, *flat)[0].numpy() for rows in chunks])
 
 
 def _extent(layer: Layer) -> tuple[Point, Point]:

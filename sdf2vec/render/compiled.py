@@ -32,8 +32,8 @@ def load(source: str) -> ModuleType:
         if not path.exists():
             write_atomically(path, source.replace(MARK, "True", 1).encode())
         return _import(path)
-    except (Sdf2vecError, OSError, RuntimeError) as error:
-        _warn_once(str(error))
+    except (Sdf2vecError, OSError, RuntimeError):
+        _warn_once(path.parent)
         module = ModuleType(path.stem)
         exec(compile(source.replace(MARK, "False", 1), str(path), "exec"), module.__dict__)
         return module
@@ -74,5 +74,7 @@ def _import(path: Path) -> ModuleType:
 
 
 @cache
-def _warn_once(reason: str) -> None:
-    warnings.warn(f"kernels are compiled anew in every run: {reason}", RuntimeWarning, stacklevel=4)
+def _warn_once(folder: Path) -> None:
+    warnings.warn(
+        f"cannot write to {folder}: kernels are compiled anew in every run", RuntimeWarning, stacklevel=4
+    )

@@ -1,0 +1,255 @@
+"""The public functions, in the words of the command line."""
+
+import inspect
+import io
+import subprocess
+import sys
+from dataclasses import replace
+from types import FunctionType
+from typing import TYPE_CHECKING
+
+import numpy as np
+import pytest
+from PIL import Image
+
+import sdf2vec
+from sdf2vec import Layer, Scene, Sdf2vecError, Shape, api
+from sdf2vec.export import EXPORTERS
+from sdf2vec.fit.presets import PRESETS
+from sdf2vec.image import load
+
+if TYPE_CHECKING:
+    from sdf2vec.fit.loop import Progress
+
+
+@pytest.fixture(autouse=True)
+def short_fits(monkeypatch):
+    """Three steps a phase: what is tested here is not the fit."""
+    monkeypatch.setitem(PRESETS, "fast", tuple(replace(phase, steps=3) for phase in PRESETS["fast"]))
+
+
+@pytest.fixture(scope="module")
+def levels():
+    return np.random.default_rng(0).integers(0, 256, (16, 24, 3), dtype=np.uint8)
+
+
+def fit(image, shapes=3, **settings):
+    return sdf2vec.fit(image, shapes, preset="fast", **settings)
+
+
+def red_circle(background: tuple[float, float, float] | None = (0, 0, 1)):
+    circle = Shape.of("circle", (1, 0, 0), center=(0, 0), radius=0.25)
+    return Scene(24, 16, (Layer((circle,), 0.1, 0.5),), background)
+
+
+def test_a_picture_is_the_same_in_every_form(levels, tmp_path):
+    path = tmp_path / "photo.png"
+    Image.fromarray(levels).save(path)
+    expected = fit(str(path))
+    assert expected.shape_count == 3
+    forms = [
+        path,
+        path.read_bytes(),
+        io.BytesIO(path.read_bytes()),
+        Image.fromarray(levels),
+        levels,
+        levels[:, :, ::-1][:, :, ::-1],
+        levels.astype(np.float32) / 255,
+        levels / 255.0,
+        load(path),
+    ]
+    for form in forms:
+        assert fit(form) == expected
+    assert fit(255 - levels) != expected
+
+
+def test_fitting_leaves_the_array_alone(levels):
+    before = levels.copy()
+    fit(levels)
+    assert (levels == before).all()
+
+
+def test_settings_matter_and_defaults_are_said(levels):
+    assert fit(levels, seed=1) == fit(levels, seed=1)
+    assert fit(levels, seed=1) != fit(levels, seed=2)
+    assert fit(levels, seed=np.int64(1)) == fit(levels, seed=1)
+    assert {layer.kind for layer in fit(levels).layers} == {"triangle"}
+    assert {layer.kind for layer in fit(levels, kind="box").layers} == {"box"}
+    assert {layer.kind for layer in fit(levels, 6, kind=["box", "circle"]).layers} == {"box", "circle"}
+    assert {layer.kind for layer in fit(levels, 40, kind="mixed").layers} == set(sdf2vec.KINDS)
+    assert fit(levels, compositing="additive").compositing == "additive"
+    assert fit(levels, loss="mse") != fit(levels, loss="l1")
+    assert inspect.signature(sdf2vec.fit).parameters["shapes"].default == 256
+
+
+def test_transparency_is_kept(levels):
+    alpha = np.zeros((16, 24, 1), np.uint8)
+    alpha[4:12, 6:18] = 255
+    assert fit(np.concatenate([levels, alpha], axis=2)).background is None
+    assert fit(np.concatenate([levels, alpha * 0 + 255], axis=2)) == fit(levels)
+
+
+@pytest.mark.parametrize(
+    ("settings", "words"),
+    [
+        ({"shapes": 0}, "number of shapes .* got 0"),
+        ({"shapes": 65537}, "number of shapes .* got 65537"),
+        ({"shapes": 2.5}, "number of shapes .* got 2.5"),
+        ({"shapes": "3"}, "number of shapes .* got 3"),
+        ({"shapes": True}, "number of shapes .* got True"),
+        ({"seed": -1}, "seed .* got -1"),
+        ({"seed": 2**63}, "seed"),
+        ({"seed": None}, "seed .* got None"),
+        ({"kind": "star"}, "unknown kind 'star'; choose from circle"),
+        ({"kind": []}, "at least one kind"),
+        ({"kind": ["mixed", "star"]}, "unknown kind 'star'"),
+        ({"compositing": "multiply"}, "unknown compositing 'multiply'; choose from over, additive"),
+        ({"preset": "slow"}, "unknown preset 'slow'"),
+        ({"loss": "l3"}, "unknown loss 'l3'; choose from l1, mse, ssim"),
+    ],
+)
+def test_impossible_settings(levels, settings, words):
+    with pytest.raises(Sdf2vecError, match=words) as caught:
+        sdf2vec.fit(levels, **settings)
+    assert "\n" not in str(caught.value)
+
+
+@pytest.mark.parametrize("image", ["missing.png", b"", b"no picture", np.zeros((0, 3)), np.zeros(5), None, 3])
+def test_impossible_pictures(image):
+    with pytest.raises(Sdf2vecError) as caught:
+        fit(image)
+    assert "\n" not in str(caught.value)
+
+
+def test_the_callback_sees_every_step(levels):
+    seen: list[Progress] = []
+
+    def note(progress: "Progress") -> bool:
+        seen.append(progress)
+        return False
+
+    scene = fit(levels, callback=note)
+    steps = 3 * len(PRESETS["fast"])
+    assert [progress.step for progress in seen] == list(range(1, steps + 1))
+    assert {progress.steps for progress in seen} == {steps}
+    assert list(dict.fromkeys(progress.phase for progress in seen)) == [p.name for p in PRESETS["fast"]]
+    assert all(0 < progress.loss < 10 for progress in seen)
+    assert scene == fit(levels)
+
+
+def test_the_callback_stops_the_fit(levels):
+    seen = []
+
+    def stop_at_second(progress):
+        seen.append(progress.step)
+        return progress.step == 2
+
+    scene = fit(levels, callback=stop_at_second)
+    assert seen == [1, 2]
+    assert scene.shape_count == 3
+    assert scene != fit(levels)
+
+
+def test_render_of_a_known_scene():
+    pixels = sdf2vec.render(red_circle())
+    assert pixels.shape == (16, 24, 3)
+    assert pixels.dtype == np.float32
+    assert pixels[0, 0].tolist() == [0, 0, 1]
+    assert pixels[8, 12] == pytest.approx([0.5, 0, 0.5], abs=1e-3)
+    assert sdf2vec.render(red_circle(), 48, 32).shape == (32, 48, 3)
+
+
+def test_render_of_a_transparent_scene_has_straight_alpha():
+    pixels = sdf2vec.render(red_circle(None))
+    assert pixels.shape == (16, 24, 4)
+    assert pixels[8, 12] == pytest.approx([1, 0, 0, 0.5], abs=1e-3)
+    assert pixels[0, 0].tolist() == [0, 0, 0, 0]
+    with Image.open(io.BytesIO(_bytes(sdf2vec.export(red_circle(None), "png")))) as png:
+        assert np.asarray(png)[8, 12].tolist() == [255, 0, 0, 128]
+
+
+def _bytes(data):
+    assert isinstance(data, bytes)
+    return data
+
+
+@pytest.mark.parametrize("target", EXPORTERS)
+def test_scenes_export_themselves(target):
+    scene = red_circle()
+    data = scene.to(target)
+    assert data == sdf2vec.export(scene, target)
+    assert data == sdf2vec.export(sdf2vec.loads(sdf2vec.dumps(scene)), target)
+    assert isinstance(data, bytes if target == "png" else str)
+
+
+def test_export_options_have_the_words_of_the_command_line():
+    scene = red_circle()
+    with Image.open(io.BytesIO(_bytes(scene.to("png", size=32)))) as png:
+        assert png.size == (48, 32)
+    assert str(scene.to("glsl", glsl="330")).startswith("#version 330")
+    assert "vec4 table[" in str(scene.to("glsl", layout="table"))
+    assert "<title>my cat</title>" in str(sdf2vec.export(scene, "svg", title="my cat"))
+
+
+@pytest.mark.parametrize(
+    ("target", "options", "words"),
+    [
+        ("pdf2", {}, "unknown target 'pdf2'; choose from glsl"),
+        ("", {}, "unknown target ''"),
+        ("glsl", {"glsl": "100"}, "unknown GLSL version '100'"),
+        ("glsl", {"layout": "loose"}, "unknown layout 'loose'"),
+        ("png", {"size": 0}, "size must be between 1 and 16384 pixels, got 0"),
+        ("png", {"size": 16384}, "png: 24576 x 16384 is more than 200 megapixels"),
+    ],
+)
+def test_impossible_exports(target, options, words):
+    for export in (
+        lambda: red_circle().to(target, **options),
+        lambda: sdf2vec.export(red_circle(), target, **options),
+    ):
+        with pytest.raises(Sdf2vecError, match=words) as caught:
+            export()
+        assert "\n" not in str(caught.value)
+
+
+def test_check_redraws_exports(require_engine):
+    require_engine("opengl")
+    results = sdf2vec.check(red_circle(), ["glsl"], [(24, 16), (30, 40)])
+    assert [(r.target, r.engine, r.width, r.height) for r in results] == [
+        ("glsl", "opengl", 24, 16),
+        ("glsl", "opengl", 30, 40),
+    ]
+    assert all(r.verdict == "same" and r.largest_error <= 0.25 and not r.missing for r in results)
+
+
+def test_psnr_is_that_of_the_8_bit_picture(levels):
+    """By hand: black against white is 0 dB, half grey against white 6.02."""
+    white = load(np.full((4, 4, 3), 255, np.uint8))
+    assert api.psnr(Scene(4, 4, (), (0, 0, 0)), white) == pytest.approx(0)
+    assert api.psnr(Scene(4, 4, (), (0.5, 0.5, 0.5)), white) == pytest.approx(20 * np.log10(2))
+
+
+def test_functions_stay_functions():
+    """They share their names with packages that are imported on the way."""
+    code = """
+import numpy, sdf2vec
+scene = sdf2vec.fit(numpy.zeros((4, 4, 3)), 1, preset="fast")
+sdf2vec.render(scene), sdf2vec.export(scene, "glsl"), scene.to("svg"), sdf2vec.check(scene, ["glsl"], [(4, 4)])
+import sdf2vec.fit.loop, sdf2vec.render.reference, sdf2vec.export.shader, sdf2vec.roundtrip
+from types import FunctionType
+print([isinstance(getattr(sdf2vec, name), FunctionType) for name in ("fit", "render", "export", "check")])
+"""
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert done.stdout == "[True, True, True, True]\n"
+    assert isinstance(sdf2vec.fit, FunctionType)
+
+
+def test_importing_does_not_import_torch():
+    code = "import sys, sdf2vec, sdf2vec.cli; print('torch' in sys.modules, 'numpy' in sys.modules)"
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert done.stdout == "False True\n"
+
+
+def test_everything_promised_is_there():
+    assert all(hasattr(sdf2vec, name) for name in sdf2vec.__all__)
+    assert issubclass(sdf2vec.SceneError, Sdf2vecError)

@@ -1,0 +1,214 @@
+"""The fused renderer against the reference in float64: values, derivatives, threads, cache."""
+
+import os
+import subprocess
+import sys
+
+import pytest
+import torch
+from hypothesis import Phase, given, settings
+from hypothesis import strategies as st
+
+from sdf2vec import Layer, Scene, Shape
+from sdf2vec.fit.ssim import Dissimilarity
+from sdf2vec.metrics import ssim
+from sdf2vec.render import compiled, fused, kernels, reference
+from sdf2vec.render.kernels import LayerKind
+from sdf2vec.render.tensors import from_scene
+from sdf2vec.shapes import KINDS
+
+from .scenes import random_scene
+
+VALUES, GRADIENTS = 1e-4, 1e-3
+UNIONS = {"circle": (3,), "box": (2,)}  # others follow the same code; each costs seconds to compile
+
+
+def outcome(composite, scene, size, dtype, channels=4):
+    """The image, and the derivatives of a fixed random sum of it, by the name of what each belongs to."""
+    tensors = from_scene(scene, dtype)
+    named = [pair for group in tensors.groups for pair in group.tensors()] + [
+        ("background", tensors.background)
+    ]
+    leaves = [tensor.requires_grad_() for _, tensor in named]
+    image = composite(tensors, *size)[:channels]
+    weights = torch.randn(image.shape, generator=torch.Generator().manual_seed(1), dtype=torch.float64)
+    grads = torch.autograd.grad((image * weights.to(dtype)).sum(), leaves)
+    return image.detach().double(), [
+        (name, grad.double()) for (name, _), grad in zip(named, grads, strict=True)
+    ]
+
+
+def assert_same_function(scene, size, channels=4):
+    image, grads = outcome(reference.composite, scene, size, torch.float64, channels)
+    fast = lambda tensors, width, height: fused.composite(tensors, width, height, channels)  # noqa: E731
+    fast_image, fast_grads = outcome(fast, scene, size, torch.float32, channels)
+    assert float((image - fast_image).abs().max()) <= VALUES
+    largest: dict[str, float] = {}
+    for name, grad in grads:
+        largest[name] = max(largest.get(name, 0.1), float(grad.abs().max()))
+    for (name, grad), (_, fast_grad) in zip(grads, fast_grads, strict=True):
+        assert float((grad - fast_grad).abs().max()) <= GRADIENTS * largest[name], name
+
+
+SIZES = st.sampled_from([(60, 40), (1, 1), (1, 37), (33, 17), (16, 16), (50, 71)])
+
+
+@given(st.integers(0, 10**6), st.integers(1, 14), st.sampled_from(["over", "additive"]), st.booleans(), SIZES)
+@settings(max_examples=40, deadline=None, phases=[Phase.explicit, Phase.reuse, Phase.generate])
+def test_same_function_as_the_reference(seed, layers, compositing, transparent, size):
+    width, height = size
+    scene = random_scene(tuple(KINDS), compositing, layers, seed, width, height, transparent, UNIONS)
+    assert_same_function(whole(scene), size)
+
+
+def whole(scene):
+    """The scene, with every kind of layer present once more: one compiled module serves all examples."""
+    extra = random_scene(tuple(KINDS), scene.compositing, layers=30, seed=99, unions=UNIONS).layers
+    missing = {(layer.kind, len(layer.shapes)): layer for layer in extra}
+    present = {(layer.kind, len(layer.shapes)) for layer in scene.layers}
+    far = [layer for key, layer in missing.items() if key not in present]
+    layers = sorted((*scene.layers, *far), key=lambda layer: (layer.kind, len(layer.shapes)))
+    order = {id(layer): i for i, layer in enumerate(scene.layers)}
+    moved = sorted(layers, key=lambda layer: order.get(id(layer), -1))
+    firsts = {(layer.kind, len(layer.shapes)): layer for layer in reversed(layers)}
+    rest = [layer for layer in moved if layer is not firsts[layer.kind, len(layer.shapes)]]
+    return Scene(scene.width, scene.height, (*firsts.values(), *rest), scene.background, scene.compositing)
+
+
+@pytest.mark.parametrize("compositing", ["over", "additive"])
+def test_three_channels(compositing):
+    assert_same_function(
+        whole(random_scene(compositing=compositing, seed=5, unions=UNIONS)), (45, 31), channels=3
+    )
+
+
+def circles(*circles_, compositing="over"):
+    layers = tuple(
+        Layer((Shape.of("circle", color, center=center, radius=radius),), falloff, opacity)
+        for center, radius, falloff, opacity, color in circles_
+    )
+    return whole(Scene(64, 64, layers, (0.2, 0.4, 0.6), compositing))
+
+
+@pytest.mark.parametrize(
+    "scene",
+    [
+        circles(((0, 0), 3.0, 0.0, 1.0, (0.1, 0.2, 0.3)), ((0.1, 0), 0.2, 0.1, 0.5, (0.9, 0.5, 0.1))),
+        circles(((0.1, 0), 0.2, 0.1, 0.5, (0.9, 0.5, 0.1)), ((0, 0), 3.0, 0.0, 1.0, (0.1, 0.2, 0.3))),
+        circles(((5, 5), 0.2, 0.1, 1.0, (0.9, 0.5, 0.1))),
+        circles(((0.3, 0.3), 1e-5, 0.0, 1.0, (1, 1, 1)), ((-0.5, 0.5), 0.3, 2.0, 0.3, (0, 1, 0))),
+    ],
+    ids=["opaque below", "opaque on top hides the rest", "off the canvas", "tiny and very soft"],
+)
+def test_special_scenes(scene):
+    assert_same_function(scene, (64, 64))
+
+
+def test_a_scene_without_layers():
+    image = fused.composite(from_scene(Scene(3, 2, (), (0.25, 0.5, 0.75))), 3, 2)
+    assert image[:, 1, 2].tolist() == [0.25, 0.5, 0.75, 1.0]
+
+
+def test_the_number_of_threads_changes_nothing(monkeypatch):
+    scene = whole(random_scene(layers=40, seed=12, unions=UNIONS))
+    results = []
+    for count in ("1", "2", "3"):
+        monkeypatch.setenv("SDF2VEC_THREADS", count)
+        image, grads = outcome(fused.composite, scene, (90, 70), torch.float32)
+        results.append([image, *(grad for _, grad in grads)])
+    for other in results[1:]:
+        assert all(torch.equal(a, b) for a, b in zip(results[0], other, strict=True))
+
+
+def test_bins_hold_every_pixel_that_is_covered():
+    """Culling by tile loses nothing: where the reference covers a pixel, its tile lists the layer."""
+    scene = whole(random_scene(layers=25, seed=21, unions=UNIONS))
+    tensors = from_scene(scene)
+    image = fused.composite(tensors, 80, 64)
+    assert image.shape == (4, 64, 80)
+    x, y, pixel = reference.canvas(tensors, 80, 64)
+    bins = binned(tensors, 80, 64)
+    for group in tensors.groups:
+        cover, _ = reference.group_coverage(group, x, y, pixel)
+        for layer, covered in zip(group.order.tolist(), cover.reshape(-1, 64, 80), strict=True):
+            for tile in range(5 * 4):
+                top, left = tile // 5 * 16, tile % 5 * 16
+                listed = layer in bins.layers[bins.starts[tile] : bins.starts[tile + 1]]
+                assert listed or float(covered[top : top + 16, left : left + 16].max()) == 0.0
+
+
+def binned(tensors, width, height):
+    leaf = tensors.background.requires_grad_()
+    image = fused.composite(tensors, width, height)
+    assert leaf.requires_grad
+    return image.grad_fn.bins  # type: ignore[union-attr]
+
+
+# --- the loss ----------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("shape", [(3, 40, 56), (4, 7, 30), (1, 1, 1), (3, 1, 50), (1, 11, 11)])
+def test_fused_ssim_is_the_metric(shape):
+    generator = torch.Generator().manual_seed(0)
+    target = torch.rand(shape, generator=generator)
+    render = (target + 0.3 * torch.rand(shape, generator=generator)).clamp(0, 1)
+    fast, exact = render.clone().requires_grad_(), render.double().requires_grad_()
+    value, wanted = Dissimilarity(target)(fast), 1 - ssim(exact, target.double())
+    assert value.item() == pytest.approx(wanted.item(), abs=1e-4)
+    (grad,) = torch.autograd.grad(2.0 * value, fast)
+    (want,) = torch.autograd.grad(2.0 * wanted, exact)
+    assert float((grad - want).abs().max()) <= 1e-3 * float(want.abs().max())
+
+
+# --- compiling ---------------------------------------------------------------------------------------------
+
+
+def test_a_text_holds_only_the_kinds_it_is_for():
+    text = kernels.text((LayerKind("circle", 1),), "over")
+    assert "# circle, 1 joined" in text
+    assert not any(f"# {kind}," in text for kind in KINDS if kind != "circle")
+
+
+def test_the_cache_key_changes_with_the_formula(monkeypatch):
+    before = compiled.path_of(kernels.text((LayerKind("circle", 1),), "over"))
+    assert before == compiled.path_of(kernels.text((LayerKind("circle", 1),), "over"))
+    assert before != compiled.path_of(kernels.text((LayerKind("circle", 1),), "additive"))
+    monkeypatch.setattr(compiled.numba, "__version__", "0")
+    assert before != compiled.path_of(kernels.text((LayerKind("circle", 1),), "over"))
+
+
+RUN = """
+import sys, warnings
+warnings.simplefilter("always")
+from sdf2vec.render import compiled
+source = "from numba import njit\\n@njit(cache=CACHE)\\ndef f(x):\\n    return x + 1\\n"
+print(compiled.load(source).f(1), compiled.is_compiled(source, "f"))
+compiled.load(source.replace("+ 1", "+ 2"))
+"""
+
+
+def run(folder):
+    environment = {**os.environ, "SDF2VEC_CACHE": str(folder)}
+    return subprocess.run(
+        [sys.executable, "-c", RUN], env=environment, capture_output=True, text=True, check=True
+    )
+
+
+def test_kernels_are_kept_in_the_cache_folder(tmp_path):
+    assert run(tmp_path / "new").stdout.split() == ["2", "True"]
+    assert len(list((tmp_path / "new").glob("kernels_*.py"))) == 2
+    assert list((tmp_path / "new" / "__pycache__").glob("*.nbi"))
+
+
+def test_without_a_cache_folder_kernels_work_with_one_warning(tmp_path):
+    (tmp_path / "file").write_text("not a folder")
+    result = run(tmp_path / "file" / "inside")
+    assert result.stdout.split() == ["2", "False"]
+    assert result.stderr.count("RuntimeWarning") == 1
+    assert "compiled anew in every run" in result.stderr
+
+
+def test_kernel_text_is_plain_python():
+    text = kernels.text(tuple(LayerKind(kind, size) for kind in KINDS for size in (1, 2)), "over")
+    compile(text, "kernels", "exec")
+    assert "{{" not in text
