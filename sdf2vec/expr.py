@@ -195,8 +195,8 @@ class Cell:
 class Operation:
     """One row: types, spelling per target, value on constants, derivative.
 
-    A row either has `torch`, `numba`, `value` and `partials` (it works on floats; vectors go by component)
-    or `expand` (other rows define it once its arguments are split into components).
+    A row either has `torch`, `numba`, `triton`, `value` and `partials` (it works on floats; vectors go by
+    component) or `expand` (other rows define it once its arguments are split into components).
     """
 
     result: Callable[[Sequence[Type]], Type]
@@ -204,6 +204,7 @@ class Operation:
     wgsl: Cell
     torch: str | None = None
     numba: str | None = None
+    triton: str | None = None
     value: Callable[..., float] | None = None
     partials: Callable[..., tuple[Operand | None, ...]] | None = None
     expand: Callable[..., tuple[Expr, ...]] | None = None
@@ -315,6 +316,7 @@ OPERATIONS: dict[str, Operation] = {
         *_both(_arithmetic("+")),
         torch="{0} + {1}",
         numba="{0} + {1}",
+        triton="{0} + {1}",
         value=lambda a, b: a + b,
         partials=lambda a, b, y: (1.0, 1.0),
     ),
@@ -323,6 +325,7 @@ OPERATIONS: dict[str, Operation] = {
         *_both(_arithmetic("-")),
         torch="{0} - {1}",
         numba="{0} - {1}",
+        triton="{0} - {1}",
         value=lambda a, b: a - b,
         partials=lambda a, b, y: (1.0, -1.0),
     ),
@@ -331,6 +334,7 @@ OPERATIONS: dict[str, Operation] = {
         *_both(_arithmetic("*")),
         torch="{0} * {1}",
         numba="{0} * {1}",
+        triton="{0} * {1}",
         value=lambda a, b: a * b,
         partials=lambda a, b, y: (b, a),
     ),
@@ -339,6 +343,7 @@ OPERATIONS: dict[str, Operation] = {
         *_both(_arithmetic("/")),
         torch="{0} / {1}",
         numba="{0} / {1}",
+        triton="{0} / {1}",
         value=lambda a, b: a / b,
         partials=lambda a, b, y: (1.0 / b, -(y / b)),
         domain="divisor not 0: whoever divides keeps it away from 0",
@@ -348,6 +353,7 @@ OPERATIONS: dict[str, Operation] = {
         *_both(Cell("-{0}", PRECEDENCE["unary"])),
         torch="-{0}",
         numba="-{0}",
+        triton="-{0}",
         value=lambda a: -a,
         partials=lambda a, y: (-1.0,),
     ),
@@ -356,6 +362,7 @@ OPERATIONS: dict[str, Operation] = {
         *_both(_call("abs")),
         torch="torch.where({0} < 0, -{0}, {0})",
         numba="({0} if {0} > ZERO else -{0})",
+        triton="tl.abs({0})",
         value=abs,
         partials=lambda a, y: (select(a < 0.0, -1.0, 1.0),),
     ),
@@ -364,6 +371,7 @@ OPERATIONS: dict[str, Operation] = {
         *_both(_call("min", 2)),
         torch="torch.where({0} < {1}, {0}, {1})",
         numba="({0} if {0} < {1} else {1})",
+        triton="tl.minimum({0}, {1})",
         value=min,
         partials=lambda a, b, y: (select(a < b, 1.0, 0.0), select(a < b, 0.0, 1.0)),
     ),
@@ -372,6 +380,7 @@ OPERATIONS: dict[str, Operation] = {
         *_both(_call("max", 2)),
         torch="torch.where({0} > {1}, {0}, {1})",
         numba="({0} if {0} > {1} else {1})",
+        triton="tl.maximum({0}, {1})",
         value=max,
         partials=lambda a, b, y: (select(a > b, 1.0, 0.0), select(a > b, 0.0, 1.0)),
     ),
@@ -381,6 +390,7 @@ OPERATIONS: dict[str, Operation] = {
         *_both(_call("sqrt")),
         torch=_SQRT,
         numba="sqrt({0} if {0} > ZERO else ZERO)",
+        triton="tl.sqrt(tl.maximum({0}, 0.0))",
         value=lambda a: math.sqrt(max(a, 0.0)),
         partials=lambda a, y: (select(a > 0.0, 0.5 / y, 0.0),),
         domain="not below 0; the derivative at 0 is 0",
@@ -390,6 +400,7 @@ OPERATIONS: dict[str, Operation] = {
         *_both(_call("exp")),
         torch="torch.exp({0})",
         numba="fast_exp({0})",
+        triton="tl.exp({0})",
         value=math.exp,
         partials=lambda a, y: (y,),
         domain="at most 80, so that float32 holds it",
@@ -399,6 +410,7 @@ OPERATIONS: dict[str, Operation] = {
         *_both(Cell("log(max({0}, 1e-30))")),
         torch="torch.log(torch.where({0} > 1e-30, {0}, 1e-30))",
         numba="log({0} if {0} > LEAST else LEAST)",
+        triton="tl.log(tl.maximum({0}, 1e-30))",
         value=lambda a: math.log(max(a, 1e-30)),
         partials=lambda a, y: (select(a > 1e-30, 1.0 / a, 0.0),),
         domain="below 1e-30 it stays what it is there",
@@ -408,6 +420,7 @@ OPERATIONS: dict[str, Operation] = {
         *_both(_call("sin")),
         torch="torch.sin({0})",
         numba="fast_sin({0})",
+        triton="tl.sin({0})",
         value=math.sin,
         partials=lambda a, y: (cos(a),),
         domain="a few hundred radians, beyond which float32 loses the phase",
@@ -417,6 +430,7 @@ OPERATIONS: dict[str, Operation] = {
         *_both(_call("cos")),
         torch="torch.cos({0})",
         numba="fast_sin({0} + QUARTER)",
+        triton="tl.cos({0})",
         value=math.cos,
         partials=lambda a, y: (-sin(a),),
         domain="a few hundred radians, beyond which float32 loses the phase",
@@ -426,6 +440,7 @@ OPERATIONS: dict[str, Operation] = {
         *_both(_SIGMOID),
         torch="torch.sigmoid({0})",
         numba="fast_sigmoid({0})",
+        triton="1.0 / (1.0 + tl.exp(tl.minimum(-{0}, 80.0)))",
         value=_sigmoid,
         partials=lambda a, y: (y * (1.0 - y),),
     ),
@@ -434,6 +449,7 @@ OPERATIONS: dict[str, Operation] = {
         *_both(_arithmetic("<")),
         torch="{0} < {1}",
         numba="{0} < {1}",
+        triton="{0} < {1}",
         value=lambda a, b: float(a < b),
         partials=lambda a, b, y: (None, None),
     ),
@@ -443,6 +459,7 @@ OPERATIONS: dict[str, Operation] = {
         Cell("select({2}, {1}, {0})"),
         torch="torch.where({0}, {1}, {2})",
         numba="({1} if {0} else {2})",
+        triton="tl.where({0}, {1}, {2})",
         value=lambda condition, a, b: a if condition else b,
         partials=lambda condition, a, b, y: (None, select(condition, 1.0, 0.0), select(condition, 0.0, 1.0)),
     ),
@@ -451,6 +468,7 @@ OPERATIONS: dict[str, Operation] = {
         *_both(Cell("{0}", PRECEDENCE["unary"], operands=CALL)),
         torch="{0}.detach()",
         numba="{0}",
+        triton="{0}",
         value=lambda a: a,
         partials=lambda a, y: (None,),
         domain="its derivative counts as 0",

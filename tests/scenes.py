@@ -1,6 +1,7 @@
 """Random scenes for tests: every kind, unions, sharp and soft, opaque and translucent."""
 
 import random
+from collections.abc import Mapping
 
 from sdf2vec import Layer, Scene, Shape
 from sdf2vec.shapes import KINDS
@@ -38,7 +39,7 @@ def random_scene(
     width: int = 60,
     height: int = 40,
     transparent: bool = False,
-    unions: dict[str, tuple[int, ...]] = ANY_UNION,
+    unions: Mapping[str, tuple[int, ...]] = ANY_UNION,
 ) -> Scene:
     """A scene in which every third layer is a union, of as many shapes as `unions` allows for its kind."""
     r = random.Random(seed)

@@ -74,12 +74,17 @@ def test_settings_matter_and_defaults_are_said(levels):
     assert fit(levels, seed=1) != fit(levels, seed=2)
     assert fit(levels, seed=np.int64(1)) == fit(levels, seed=1)
     assert {layer.kind for layer in fit(levels).layers} == {"triangle"}
-    assert {layer.kind for layer in fit(levels, kind="box").layers} == {"box"}
-    assert {layer.kind for layer in fit(levels, 6, kind=["box", "circle"]).layers} == {"box", "circle"}
+    assert {layer.kind for layer in fit(levels, kind=["circle"]).layers} == {"circle"}
     assert {layer.kind for layer in fit(levels, 40, kind="mixed").layers} == set(sdf2vec.KINDS)
     assert fit(levels, compositing="additive").compositing == "additive"
     assert fit(levels, loss="mse") != fit(levels, loss="l1")
     assert inspect.signature(sdf2vec.fit).parameters["shapes"].default == 256
+
+
+def test_names_of_kinds():
+    assert api.kinds_of("box") == ("box",)
+    assert api.kinds_of(["box", "circle", "box"]) == ("box", "circle")
+    assert api.kinds_of("mixed") == api.kinds_of(["box", "mixed"]) == tuple(sdf2vec.KINDS)
 
 
 def test_transparency_is_kept(levels):

@@ -27,18 +27,18 @@ class Phase:
 
 PRESETS: dict[str, tuple[Phase, ...]] = {
     "fast": (
-        Phase("coarse", 100, 40),
-        Phase("fine", 80, 80, rate=0.8, end_rate=0.05),
+        Phase("coarse", 120, 48),
+        Phase("fine", 100, 112, rate=0.8, end_rate=0.05),
     ),
     "balanced": (
-        Phase("coarse", 200, 48),
-        Phase("middle", 150, 96, rate=0.8, end_rate=0.5),
-        Phase("fine", 120, 144, rate=0.5, end_rate=0.03),
+        Phase("coarse", 300, 64),
+        Phase("middle", 250, 128, rate=0.8, end_rate=0.4),
+        Phase("fine", 150, 256, rate=0.4, end_rate=0.02),
     ),
     "best": (
-        Phase("coarse", 400, 48),
-        Phase("middle", 400, 96, rate=0.8, end_rate=0.5),
-        Phase("fine", 400, 192, rate=0.5, end_rate=0.02),
+        Phase("coarse", 600, 64),
+        Phase("middle", 700, 160, rate=0.8, end_rate=0.4),
+        Phase("fine", 500, 320, rate=0.4, end_rate=0.01),
     ),
 }
 DEFAULT = "balanced"
