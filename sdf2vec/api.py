@@ -57,9 +57,9 @@ def fit(
 
 def render(scene: Scene, width: int | None = None, height: int | None = None) -> NDArray[np.float32]:
     """The scene as an array [height, width, 3], or [.., 4] with straight alpha when it is transparent; 0..1."""
-    from .render.reference import render as render_tensor
+    from .render.draw import draw
 
-    pixels: NDArray[np.float32] = render_tensor(scene, width, height).permute(1, 2, 0).numpy()
+    pixels: NDArray[np.float32] = draw(scene, width, height).permute(1, 2, 0).numpy()
     return np.ascontiguousarray(pixels[..., :3]) if scene.background else unpremultiply(pixels)
 
 
@@ -85,11 +85,11 @@ def psnr(scene: Scene, picture: Picture) -> float:
     import torch
 
     from .metrics import psnr as measure
-    from .render.reference import render as render_tensor
+    from .render.draw import draw
 
     pixels = premultiply(picture.pixels) if picture.has_alpha else picture.pixels
     target = torch.from_numpy(np.ascontiguousarray(pixels.transpose(2, 0, 1)))
-    return float(measure(render_tensor(scene, picture.width, picture.height)[: len(target)], target))
+    return float(measure(draw(scene, picture.width, picture.height)[: len(target)], target))
 
 
 def check_settings(

@@ -86,7 +86,14 @@ def default_sizes(scene: Scene, trip: RoundTrip) -> list[Size]:
     width, height = fitted_size(scene.width, scene.height, shortest)
     if trip.any_shape:
         return [(width, height), (width * 5 // 4 + 1, height * 11 // 10 + 2), (19, 13)]
-    return [fitted_size(scene.width, scene.height, side) for side in (shortest, shortest * 5 // 4 + 1, 24)]
+    return [(width, height), (2 * width, 2 * height), _small(width, height)]
+
+
+def _small(width: int, height: int) -> Size:
+    """A small canvas of exactly the same shape."""
+    common = math.gcd(width, height)
+    times = -(-24 * common // min(width, height))
+    return width // common * min(times, common), height // common * min(times, common)
 
 
 def _check_trip(scene: Scene, trip: RoundTrip, sizes: Sequence[Size]) -> list[Check]:

@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from sdf2vec import Layer, Scene, Shape
 from sdf2vec.fit.ssim import Dissimilarity
 from sdf2vec.metrics import ssim
-from sdf2vec.render import compiled, fused, kernels, reference
+from sdf2vec.render import compiled, draw, fused, kernels, reference
 from sdf2vec.render.kernels import LayerKind
 from sdf2vec.render.tensors import from_scene
 from sdf2vec.shapes import KINDS
@@ -212,3 +212,11 @@ def test_kernel_text_is_plain_python():
     text = kernels.text(tuple(LayerKind(kind, size) for kind in KINDS for size in (1, 2)), "over")
     compile(text, "kernels", "exec")
     assert "{{" not in text
+
+
+def test_large_scenes_are_drawn_by_the_fused_renderer_and_look_the_same(monkeypatch):
+    scene = whole(random_scene(seed=5, unions=UNIONS))
+    dense = draw.draw(scene, 50, 40)
+    assert torch.equal(dense, reference.render(scene, 50, 40))
+    monkeypatch.setattr(draw, "LARGE", 0)
+    assert 0.0 < float((draw.draw(scene, 50, 40) - dense).abs().max()) <= VALUES

@@ -13,7 +13,7 @@ def png(scene: Scene, options: Options) -> bytes:
 
     Raises Sdf2vecError for more than MAX_PIXELS pixels.
     """
-    from ..render.reference import render
+    from ..render.draw import draw
 
     width, height = scene.width, scene.height
     if options.size:
@@ -23,5 +23,5 @@ def png(scene: Scene, options: Options) -> bytes:
         raise Sdf2vecError(
             f"png: {width} x {height} is more than {limit} megapixels; choose a smaller --size"
         )
-    pixels = render(scene, width, height).permute(1, 2, 0).numpy()
+    pixels = draw(scene, width, height).permute(1, 2, 0).numpy()
     return encode_png(pixels[..., :3] if scene.background else unpremultiply(pixels))

@@ -66,7 +66,7 @@ def _render(name: str, dialect: Dialect, scene: Scene, options: Options, **more:
     size = vec2(*(const(side) for side in scene.extent))
     return template(name).render(
         scene=scene,
-        title=options.title.replace("\n", " ").replace("\\", "/"),
+        title="".join(c if c.isprintable() and c != "\\" else " " for c in options.title),
         size=expression(size, dialect),
         background=expression(_background(scene), dialect),
         **body,

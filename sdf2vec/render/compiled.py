@@ -13,6 +13,7 @@ import sys
 import warnings
 from functools import cache
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from types import ModuleType
 
 import numba
@@ -37,6 +38,23 @@ def load(source: str) -> ModuleType:
         module = ModuleType(path.stem)
         exec(compile(source.replace(MARK, "False", 1), str(path), "exec"), module.__dict__)
         return module
+
+
+@cache
+def load_file(source: str) -> ModuleType:
+    """The module of this text, always from a file: Triton reads the text of its functions from there.
+
+    Without a cache folder the file is in a temporary one, which is removed when the program ends.
+    """
+    path = path_of(source)
+    try:
+        if not path.exists():
+            write_atomically(path, source.encode())
+    except (Sdf2vecError, OSError) as error:
+        _warn_once(str(error))
+        path = Path(_temporary_folder().name) / path.name
+        write_atomically(path, source.encode())
+    return _import(path)
 
 
 def is_compiled(source: str, function: str) -> bool:
@@ -71,6 +89,11 @@ def _import(path: Path) -> ModuleType:
     sys.modules[path.stem] = module
     spec.loader.exec_module(module)
     return module
+
+
+@cache
+def _temporary_folder() -> TemporaryDirectory[str]:
+    return TemporaryDirectory(prefix="sdf2vec-")
 
 
 @cache

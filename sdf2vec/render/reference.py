@@ -38,7 +38,12 @@ def render(
     with torch.no_grad():
         tensors = from_scene(scene, dtype, device)
         image = composite(tensors, width or scene.width, height or scene.height)
-        return torch.stack(_display()(*image))
+        return displayed(image)
+
+
+def displayed(image: torch.Tensor) -> torch.Tensor:
+    """What a screen shows of premultiplied RGBA [4, H, W]: clamped."""
+    return torch.stack(_display()(*image))
 
 
 def composite(tensors: SceneTensors, width: int, height: int) -> torch.Tensor:
