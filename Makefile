@@ -20,7 +20,7 @@ ENGINES := libegl1 libegl-mesa0 libgl1 libgl1-mesa-dri libgbm1 libgles2 mesa-vul
            glslang-tools libcairo2
 
 .DEFAULT_GOAL := demo
-.PHONY: demo test lint format engines clean distclean
+.PHONY: demo test bench lint format engines clean distclean
 
 demo: $(VENV)/.installed
 	$(BIN)/sdf2vec examples/coffee.png --shapes 64 --seed 0 --emit json,glsl,shadertoy,wgsl,svg,png -o out/demo
@@ -36,6 +36,10 @@ lint: $(VENV)/.installed-test
 format: $(VENV)/.installed-test
 	$(BIN)/ruff check --fix
 	$(BIN)/ruff format
+
+# Speed: the tables of docs/speed.md, on this machine; some minutes.
+bench: $(VENV)/.installed-test
+	$(BIN)/python -m sdf2vec.bench.speed -o docs/speed.md
 
 # Without them the tests that draw on real engines are skipped and say so; where CI is set they fail.
 engines:

@@ -65,7 +65,7 @@ def fit_picture(picture: Picture, settings: Settings, callback: Callback = lambd
 
 def optimise(tensors: SceneTensors, pixels: np.ndarray, phases: Sequence[Phase], callback: Callback) -> None:
     """Runs the phases on a scene in place. `pixels`: premultiplied [H, W, 3 or 4]."""
-    optimizer = _adam(tensors)
+    optimizer = adam(tensors)
     pixel = 1.0 / min(pixels.shape[:2])
     steps = sum(phase.steps for phase in phases)
     done = 0
@@ -97,7 +97,7 @@ def _step(
     return float(value.detach())
 
 
-def _adam(tensors: SceneTensors) -> torch.optim.Adam:
+def adam(tensors: SceneTensors) -> torch.optim.Adam:
     """Adam over all that may move, each tensor at the rate of what it means."""
     groups = [(name, tensor) for group in tensors.groups for name, tensor in group.tensors()]
     if tensors.transparent:

@@ -38,17 +38,28 @@ def composite(tensors: SceneTensors, width: int, height: int, channels: int = 4)
     """
     if not tensors.groups:
         return tensors.background[:channels, None, None].expand(channels, height, width)
-    axes = canvas_axes(tensors, -(-width // TILE) * TILE, -(-height // TILE) * TILE, width, height)
-    rows = _rows(tensors.groups, float(axes[2]))
-    kinds = kinds_of(tensors)
-    module = kernels.load(kinds, tensors.compositing)
-    order = torch.cat([group.order for group in tensors.groups]).argsort()
-    index = np.repeat(np.arange(len(kinds)), [len(group.order) for group in tensors.groups])[order.numpy()]
-    canvas = _Canvas(module, index, width, height, *axes, hides=tensors.compositing == "over")
+    canvas, rows = _canvas(tensors, width, height)
+    order = _draw_order(tensors)
     colors = torch.cat([group.colors[:, 0] for group in tensors.groups])[order]
     opacity = torch.cat([group.opacity for group in tensors.groups])[order]
-    image: torch.Tensor = _Composite.apply(canvas, channels, rows[order], colors, opacity, tensors.background)
+    image: torch.Tensor = _Composite.apply(canvas, channels, rows, colors, opacity, tensors.background)
     return image
+
+
+def _canvas(tensors: SceneTensors, width: int, height: int) -> tuple[_Canvas, torch.Tensor]:
+    """What a render needs, and the layers' rows of uniforms in draw order."""
+    axes = canvas_axes(tensors, -(-width // TILE) * TILE, -(-height // TILE) * TILE, width, height)
+    kinds = kinds_of(tensors)
+    module = kernels.load(kinds, tensors.compositing)
+    order = _draw_order(tensors)
+    index = np.repeat(np.arange(len(kinds)), [len(group.order) for group in tensors.groups])[order.numpy()]
+    canvas = _Canvas(module, index, width, height, *axes, hides=tensors.compositing == "over")
+    return canvas, _rows(tensors.groups, float(axes[2]))[order]
+
+
+def _draw_order(tensors: SceneTensors) -> torch.Tensor:
+    """For each place in the draw order, where that layer stands when the groups follow each other."""
+    return torch.cat([group.order for group in tensors.groups]).argsort()
 
 
 def kinds_of(tensors: SceneTensors) -> tuple[LayerKind, ...]:
@@ -70,6 +81,12 @@ def threads_of_its_own() -> Iterator[None]:
         yield
     finally:
         torch.set_num_threads(before)
+
+
+def bins_of(tensors: SceneTensors, width: int, height: int) -> Bins:
+    """Which layers touch each tile of a canvas of this size."""
+    canvas, rows = _canvas(tensors, width, height)
+    return _bin(canvas, _array(rows))
 
 
 def _rows(groups: list[Group], pixel: float) -> torch.Tensor:
@@ -110,7 +127,7 @@ class _Canvas:
 
 
 @dataclass(frozen=True)
-class _Bins:
+class Bins:
     """Which layers touch each tile: those of tile t are layers[starts[t]:starts[t + 1]], in draw order."""
 
     starts: NDArray[np.int64]
@@ -118,7 +135,7 @@ class _Bins:
     full: NDArray[np.bool_]  # the layer covers all of the tile
 
 
-def _bin(canvas: _Canvas, uniforms: Floats) -> _Bins:
+def _bin(canvas: _Canvas, uniforms: Floats) -> Bins:
     module, count = canvas.module, len(canvas.kinds)
     limits, ranges = np.empty((count, 3), np.float32), np.empty((count, 4), np.int64)
     place = (canvas.x, canvas.y, canvas.pixel, canvas.columns)
@@ -128,7 +145,7 @@ def _bin(canvas: _Canvas, uniforms: Floats) -> _Bins:
     starts = np.zeros(canvas.columns * canvas.rows + 1, np.int64)
     sorted_layers, sorted_full = np.empty(pairs, np.int32), np.empty(pairs, np.bool_)
     module.sort_pairs(pairs, tiles, layers, full, starts, sorted_layers, sorted_full)
-    return _Bins(starts, sorted_layers, sorted_full)
+    return Bins(starts, sorted_layers, sorted_full)
 
 
 class _Composite(torch.autograd.Function):
