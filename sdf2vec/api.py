@@ -25,6 +25,7 @@ if TYPE_CHECKING:
 
 MIXED = "mixed"
 LOSS_NAMES = ("l1", "mse", "ssim")
+DEVICES = ("auto", "cpu", "cuda", "mps")
 
 
 def fit(
@@ -36,22 +37,25 @@ def fit(
     preset: str = DEFAULT,
     loss: str | None = None,
     seed: int = 0,
+    device: str = "auto",
     callback: Callable[[Progress], bool] | None = None,
 ) -> Scene:
     """Fits `shapes` shapes to a picture.
 
     `image`: a path, bytes, a file object, a PIL image or an array [H, W], [H, W, 3] or [H, W, 4] (sRGB-coded;
     integers, or floats 0..1). `kind`: a name in `sdf2vec.KINDS`, several, or "mixed" for all. `compositing`:
-    "over" or "additive". `loss`: "l1", "mse" or "ssim"; None leaves it to the preset. `callback` is called with
+    "over" or "additive". `loss`: "l1", "mse" or "ssim"; None leaves it to the preset.
+    `device`: "auto", "cpu", "cuda" or "mps". `callback` is called with
     the progress after every step and ends the fit by returning True. The same arguments give the same scene.
     Raises Sdf2vecError for anything that can't be fitted.
     """
     kinds = check_settings(shapes, kind, compositing, preset, loss, seed)
+    _check_choice("device", device, DEVICES)
     picture = image if isinstance(image, Picture) else _load_picture(image)
     from .fit.loop import Settings, fit_picture
 
     weighted = ((loss, 1.0),) if loss else None
-    settings = Settings(int(shapes), kinds, compositing, preset, weighted, int(seed))
+    settings = Settings(int(shapes), kinds, compositing, preset, weighted, int(seed), device)
     return fit_picture(picture, settings, callback or (lambda progress: False))
 
 

@@ -89,6 +89,9 @@ def _convert_parser() -> argparse.ArgumentParser:
     parser.add_argument("--compositing", default="over", help="over (default) or additive")
     parser.add_argument("--preset", default=DEFAULT, help=f"{', '.join(PRESETS)} (default: {DEFAULT})")
     parser.add_argument("--loss", help=f"{', '.join(api.LOSS_NAMES)} (default: the preset's)")
+    parser.add_argument(
+        "--device", default="auto", choices=api.DEVICES, help="where to fit (default: auto, which is the CPU)"
+    )
     parser.add_argument("--seed", type=int, default=0, help="the same seed gives the same scene (default: 0)")
     _add_options(parser)
     parser.add_argument("--quiet", action="store_true", help="print errors only")
@@ -199,6 +202,7 @@ def _fit(picture: Picture, options: argparse.Namespace, stop: _Stop) -> Scene:
             preset=options.preset,
             loss=options.loss,
             seed=options.seed,
+            device=options.device,
             callback=callback,
         )
 
@@ -362,7 +366,7 @@ def _progress(quiet: bool) -> Iterator[Callable[[Progress], None]]:
         def report(progress: Progress) -> None:
             bar.update(
                 task,
-                description=progress.phase,
+                description=f"{progress.phase} on {progress.device}",
                 completed=progress.step,
                 total=progress.steps,
                 loss=progress.loss,

@@ -7,12 +7,14 @@ import pytest
 import torch
 
 import sdf2vec
-from sdf2vec.fit import constraints, losses
+from sdf2vec.fit import constraints, loop, losses
 from sdf2vec.fit.loop import Progress, Settings, fit_picture, scaled
 from sdf2vec.fit.placing import detail, place
 from sdf2vec.fit.presets import PRESETS, RATES
 from sdf2vec.image import Picture
 from sdf2vec.metrics import mse, psnr
+from sdf2vec.render import device
+from sdf2vec.render.device import Device
 from sdf2vec.render.reference import render
 from sdf2vec.render.tensors import from_scene
 from sdf2vec.shapes import KINDS
@@ -147,3 +149,20 @@ def test_pictures_are_scaled_down_only():
 def test_everything_that_moves_has_a_rate():
     names = {name for group in from_scene(random_scene(layers=20)).groups for name, _ in group.tensors()}
     assert names | {"background"} == set(RATES)
+
+
+def test_a_device_that_is_not_there_is_refused_in_one_line():
+    if torch.cuda.is_available():
+        pytest.skip("this machine has a CUDA device")
+    with pytest.raises(sdf2vec.Sdf2vecError, match=r"^no cuda device here.*use --device cpu$"):
+        sdf2vec.fit(picture().pixels, 2, preset="fast", device="cuda")
+
+
+def test_the_dense_renderer_serves_other_devices(monkeypatch):
+    """What `mps` runs, run on the CPU: nearly the same scene as the fused kernels give."""
+    monkeypatch.setattr(loop, "choose", {"mps": Device("cpu", device._dense)}.__getitem__)
+    pic = picture()
+    scene = fit_picture(pic, Settings(4, ("circle",), preset="fast", device="mps"))
+    monkeypatch.undo()
+    fused = fit_picture(pic, Settings(4, ("circle",), preset="fast"))
+    assert float(psnr(render(scene)[:3], render(fused)[:3])) > 30.0

@@ -5,13 +5,15 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 import torch
 
 from ..image import Picture, premultiply, resize
-from ..render.fused import composite, is_compiled, threads_of_its_own
-from ..render.tensors import SceneTensors, to_scene
+from ..render.device import Device, choose
+from ..render.fused import is_compiled, threads_of_its_own
+from ..render.tensors import SceneTensors, on_device, to_scene
 from ..scene import Scene
 from .constraints import project
 from .losses import Objective, objective
@@ -21,7 +23,10 @@ from .presets import DEFAULT, LENGTHS, PRESETS, RATES, Loss, Phase
 
 @dataclass(frozen=True)
 class Settings:
-    """What to fit and how. `kinds`: names in `shapes.KINDS`; `loss`: replaces the preset's, when given."""
+    """What to fit and how. `kinds`: names in `shapes.KINDS`; `loss`: replaces the preset's, when given.
+
+    `device`: auto, cpu, cuda or mps.
+    """
 
     shapes: int = 256
     kinds: tuple[str, ...] = ("triangle",)
@@ -29,16 +34,18 @@ class Settings:
     preset: str = DEFAULT
     loss: Loss | None = None
     seed: int = 0
+    device: str = "auto"
 
 
 @dataclass(frozen=True)
 class Progress:
-    """Where a fit stands; `step` counts over all phases."""
+    """Where a fit stands, and on which device; `step` counts over all phases."""
 
     phase: str
     step: int
     steps: int
     loss: float
+    device: str = "cpu"
 
 
 Callback = Callable[[Progress], bool]  # returns True to stop
@@ -49,6 +56,7 @@ def fit_picture(picture: Picture, settings: Settings, callback: Callback = lambd
 
     The callback runs after every step; when it returns True, the fit ends and what is there is returned.
     """
+    device = choose(settings.device)
     generator = torch.Generator().manual_seed(settings.seed)
     phases = [_with_loss(phase, settings.loss) for phase in PRESETS[settings.preset]]
     pixels = premultiply(picture.pixels) if picture.has_alpha else picture.pixels
@@ -57,39 +65,39 @@ def fit_picture(picture: Picture, settings: Settings, callback: Callback = lambd
     start = scaled(pixels, phases[0].resolution)
     tensors = place(start, size, settings.kinds, settings.shapes, settings.compositing, generator)
     with threads_of_its_own():
-        if not is_compiled(tensors):
+        if device.name == "cpu" and not is_compiled(tensors):
             callback(Progress("compiling kernels (once)", 0, sum(phase.steps for phase in phases), math.nan))
-        optimise(tensors, pixels, phases, callback)
+        tensors = on_device(tensors, device.name)
+        optimise(tensors, pixels, phases, callback, device)
     return to_scene(tensors, picture.width, picture.height)
 
 
-def optimise(tensors: SceneTensors, pixels: np.ndarray, phases: Sequence[Phase], callback: Callback) -> None:
+def optimise(
+    tensors: SceneTensors, pixels: np.ndarray, phases: Sequence[Phase], callback: Callback, device: Device
+) -> None:
     """Runs the phases on a scene in place. `pixels`: premultiplied [H, W, 3 or 4]."""
     optimizer = adam(tensors)
     pixel = 1.0 / min(pixels.shape[:2])
     steps = sum(phase.steps for phase in phases)
     done = 0
     for phase in phases:
-        target = scaled(pixels, phase.resolution)
+        target = scaled(pixels, phase.resolution).to(device.name)
         measure = objective(phase.loss, target)
+        channels, height, width = target.shape
+        draw = partial(device.composite, tensors, width, height, channels)
         for rate in _rates(phase):
-            loss = _step(tensors, target.shape, measure, optimizer, rate)
+            loss = _step(draw, measure, optimizer, rate)
             project(tensors, pixel)
             done += 1
-            if callback(Progress(phase.name, done, steps, loss)):
+            if callback(Progress(phase.name, done, steps, loss, device.name)):
                 return
 
 
 def _step(
-    tensors: SceneTensors,
-    shape: torch.Size,
-    measure: Objective,
-    optimizer: torch.optim.Optimizer,
-    rate: float,
+    draw: Callable[[], torch.Tensor], measure: Objective, optimizer: torch.optim.Optimizer, rate: float
 ) -> float:
     optimizer.zero_grad(set_to_none=True)
-    channels, height, width = shape
-    value = measure(composite(tensors, width, height, channels))
+    value = measure(draw())
     value.backward()
     for group in optimizer.param_groups:
         group["lr"] = group["base_rate"] * rate

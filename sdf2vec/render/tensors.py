@@ -60,6 +60,20 @@ class SceneTensors:
         return float(self.background[3].detach()) == 0.0
 
 
+def on_device(tensors: SceneTensors, device: str) -> SceneTensors:
+    """The same scene with its tensors on another device."""
+    groups = [
+        Group(
+            group.kind,
+            group.order.to(device),
+            {name: values.to(device) for name, values in group.parameters.items()},
+            *(values.to(device) for values in (group.colors, group.falloff, group.opacity, group.smoothness)),
+        )
+        for group in tensors.groups
+    ]
+    return SceneTensors(groups, tensors.background.to(device), tensors.compositing, tensors.size)
+
+
 def from_scene(scene: Scene, dtype: torch.dtype = torch.float32, device: str = "cpu") -> SceneTensors:
     """The scene's numbers as tensors."""
     members: dict[tuple[str, int], list[int]] = defaultdict(list)
