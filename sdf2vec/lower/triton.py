@@ -1,7 +1,7 @@
 """Lowering to Triton: expressions become the text of device functions of a block of pixels, on the GPU.
 
-Uniforms come in as scalars and varying inputs as blocks of any shape; the derivatives by the uniforms are summed
-over the block. Everything is float32. This module makes text only; `render.triton_kernels` puts it together.
+Varying inputs are blocks of pixels, uniforms scalars; the derivatives by the uniforms are summed over the block.
+Everything is float32. This module makes text only; `render.triton_kernels` puts it together.
 """
 
 from __future__ import annotations
@@ -18,42 +18,73 @@ import triton.language as tl
 '''
 
 
-def forward(block: Block) -> str:
-    """`def NAME(uniform, …, varying, …)`: returns the outputs, a tuple where there are several."""
+def forward(block: Block, rows: bool = False) -> str:
+    """`def NAME(uniform, …, varying, …)`: returns the outputs, a tuple where there are several.
+
+    With `rows`, `def NAME(u, varying, …)`: the uniforms are read from the row that `u` points to.
+    """
     outputs = without_divisions(block.outputs, block.varying)
     writer = _Writer()
-    lines = writer.lines(outputs)
-    results = [writer.spelled(output) for output in outputs]
-    return _function(block.name, (*block.uniforms, *block.varying), lines, results)
+    lines = [*_loads(block, rows), *writer.lines(outputs)]
+    lines.append(f"return {', '.join(map(writer.spelled, outputs))}")
+    return _function(block.name, [*_uniforms(block, rows), *map(_name, block.varying)], lines)
 
 
-def backward(block: Block, flows: Sequence[Expr] = ()) -> str:
+def backward(block: Block, flows: Sequence[Expr] = (), rows: bool = False) -> str:
     """`def NAME_backward(uniform, …, varying, …, seed0, …)`: the derivatives of Σ seedᵢ·outputᵢ.
 
-    Returns a tuple: those by the varying inputs named in `flows`, pixel by pixel, then those by the uniforms, summed
-    over the pixels.
+    Returns a tuple: those by the varying inputs named in `flows`, pixel by pixel, then those by the uniforms. With
+    `rows`, `def NAME_backward(u, varying, …, seed0, …, grad)`: the latter are written to the row `grad` instead.
     """
     found = derivatives(block, flows)
     writer = _Writer()
-    lines = writer.lines((*found.sums, *found.flows))
-    lines += [f"sum{i} = {_summed(node, writer)}" for i, node in enumerate(found.sums)]
+    lines = [*_loads(block, rows), *writer.lines((*found.sums, *found.flows)), *_sums(found.sums, writer)]
     by_uniforms = [const(0.0) if node is None else node for node in found.uniforms]
     lines += writer.lines(by_uniforms)
-    results = [writer.spelled(node) for node in (*found.flows, *by_uniforms)]
-    return _function(
-        f"{block.name}_backward", (*block.uniforms, *block.varying, *found.seeds), lines, results
-    )
+    spelled = [writer.spelled(node) for node in by_uniforms]
+    returned = [writer.spelled(node) for node in found.flows]
+    if rows:
+        lines += [f"tl.store(grad + {i}, {value})" for i, value in enumerate(spelled)]
+    else:
+        returned += spelled
+    if returned:
+        lines.append(f"return {', '.join(returned)}")
+    inputs = [
+        *_uniforms(block, rows),
+        *map(_name, (*block.varying, *found.seeds)),
+        *(["grad"] if rows else []),
+    ]
+    return _function(f"{block.name}_backward", inputs, lines)
 
 
-def _summed(node: Expr, writer: _Writer) -> str:
-    """A derivative has a factor that differs from pixel to pixel, its seed, unless it is the constant 0."""
-    return writer.spelled(node) if node.op == "const" else f"tl.sum({writer.spelled(node)}, 0)"
+def _uniforms(block: Block, rows: bool) -> list[str]:
+    return ["u"] if rows else [_name(uniform) for uniform in block.uniforms]
 
 
-def _function(name: str, inputs: Sequence[Expr], lines: Sequence[str], results: Sequence[str]) -> str:
-    arguments = ", ".join(str(variable.payload) for variable in inputs)
-    body = [f"    {line}" for line in (*lines, f"return {', '.join(results)}")]
-    return "\n".join(["@triton.jit", f"def {name}({arguments}):", *body]) + "\n"
+def _loads(block: Block, rows: bool) -> list[str]:
+    if not rows:
+        return []
+    return [f"{_name(uniform)} = tl.load(u + {i})" for i, uniform in enumerate(block.uniforms)]
+
+
+def _sums(nodes: Sequence[Expr], writer: _Writer) -> list[str]:
+    """Sums over the block, each taken once. Every derivative has a seed, which is pixelwise, unless it is 0."""
+    lines, done = [], dict[Expr, str]()
+    for i, node in enumerate(nodes):
+        summed = _name(node) if node.op == "const" else f"tl.sum({writer.spelled(node)}, 0)"
+        lines.append(f"sum{i} = {done.get(node, summed)}")
+        done.setdefault(node, f"sum{i}")
+    return lines
+
+
+def _name(node: Expr) -> str:
+    """A variable or a constant as it is written; a bare number takes the type of what it meets, float32."""
+    return repr(constant(node)) if node.op == "const" else str(node.payload)
+
+
+def _function(name: str, arguments: Sequence[str], lines: Sequence[str]) -> str:
+    body = "\n".join(f"    {line}" for line in lines)
+    return f"@triton.jit\ndef {name}({', '.join(arguments)}):\n{body}\n"
 
 
 class _Writer:
@@ -71,11 +102,9 @@ class _Writer:
             text = OPERATIONS[node.op].triton
             assert text is not None, f"{node.op} must be scalarized first"
             name = f"t{len(self.names) + 1}"
-            written.append(f"{name} = {text.format(*(self.spelled(arg) for arg in node.args))}")
+            written.append(f"{name} = {text.format(*map(self.spelled, node.args))}")
             self.names[node] = name
         return written
 
     def spelled(self, node: Expr) -> str:
-        if node.op == "const":
-            return repr(constant(node))
-        return str(node.payload) if node.op == "var" else self.names[node]
+        return self.names.get(node) or _name(node)

@@ -1,0 +1,282 @@
+"""The GPU renderer against numpy and the reference in float64: on a GPU, or in Triton's interpreter without one."""
+
+import os
+import subprocess
+import sys
+from importlib import import_module
+from importlib.util import find_spec
+from itertools import pairwise
+from pathlib import Path
+
+import numpy as np
+import pytest
+import torch
+
+from sdf2vec import Layer, Scene, Shape
+from sdf2vec.expr import OPERATIONS, scalarize, var
+from sdf2vec.lower import triton as triton_lowering
+from sdf2vec.lower.block import Block
+from sdf2vec.render import compiled, fused, reference, triton_fused, triton_kernels
+from sdf2vec.render.kernels import LayerKind
+from sdf2vec.render.tensors import from_scene
+from sdf2vec.shapes import KINDS
+
+from . import conftest
+from .operations import MEANINGS, expected
+from .scenes import random_scene
+
+DEVICE = "cuda" if torch.cuda.is_available() else "cpu"
+if DEVICE == "cpu":  # before anything imports Triton
+    os.environ.setdefault("TRITON_INTERPRET", "1")
+if find_spec("triton"):
+    import_module("triton")  # now: its LLVM does not load after that of a software OpenGL driver
+
+conftest.MISSING["triton"] = lambda: None if find_spec("triton") else "not installed"
+pytestmark = [
+    pytest.mark.filterwarnings("ignore::RuntimeWarning:triton"),  # the interpreter's 0.5 / 0, not selected
+    pytest.mark.usefixtures("triton"),
+]
+
+VALUES, GRADIENTS = 1e-4, 1e-3
+ARGUMENTS = [var(name) for name in ("x0", "x1", "x2", "x3", "x4")]
+SIZE = 256
+
+
+@pytest.fixture
+def triton(require_engine):
+    require_engine("triton")
+
+
+# --- operations --------------------------------------------------------------------------------------------
+
+
+def operation_text(name, meaning):
+    """A kernel that computes an operation at `SIZE` rows of arguments."""
+    inputs = tuple(ARGUMENTS[: meaning.arity])
+    outputs = scalarize(meaning.build(*inputs))
+    loads = ", ".join(f"tl.load(given + {i} * {SIZE} + tl.arange(0, {SIZE}))" for i in range(len(inputs)))
+    names = [f"out{i}" for i in range(len(outputs))]
+    stores = [f"    tl.store(to + {i} * {SIZE} + tl.arange(0, {SIZE}), {out})" for i, out in enumerate(names)]
+    head = f"@triton.jit\ndef run_{name}(given, to):\n    {', '.join(names)} = op_{name}({loads})\n"
+    return triton_lowering.forward(Block(f"op_{name}", outputs, inputs, ())) + head + "\n".join(stores) + "\n"
+
+
+@pytest.mark.parametrize("name", OPERATIONS)
+def test_operation(name):
+    meaning = MEANINGS[name]
+    texts = [operation_text(*item) for item in MEANINGS.items()]
+    module = compiled.load_file("\n\n".join([triton_lowering.PREAMBLE, *texts]))
+    cases = np.array(meaning.cases, dtype=np.float32)
+    given = torch.tensor(np.resize(cases, (SIZE, meaning.arity)).T.copy(), device=DEVICE)
+    to = torch.empty((meaning.build(*ARGUMENTS[: meaning.arity]).type.width, SIZE), device=DEVICE)
+    getattr(module, f"run_{name}")[(1,)](given, to)
+    got, want = to.cpu().numpy()[:, : len(cases)], expected(meaning, cases)
+    size = np.abs(cases).max(axis=1) if name in ("add", "sub", "mix", "dot") else 1.0
+    scale = np.maximum(np.abs(want), size**2 if name == "dot" else size)
+    assert (np.abs(got - want) <= 5e-6 * scale).all()
+
+
+def test_every_row_that_computes_has_a_triton_cell():
+    assert all(bool(row.triton) == bool(row.numba) for row in OPERATIONS.values())
+
+
+# --- whole scenes ------------------------------------------------------------------------------------------
+
+
+def outcome(composite, tensors, size):
+    """The image, and the derivatives of a fixed random sum of it, by the name of what each belongs to."""
+    named = [pair for group in tensors.groups for pair in group.tensors()]
+    named.append(("background", tensors.background))
+    leaves = [tensor.requires_grad_() for _, tensor in named]
+    image = composite(tensors, *size)
+    weights = torch.randn(image.shape, generator=torch.Generator().manual_seed(1), dtype=torch.float64)
+    grads = torch.autograd.grad((image * weights.to(image)).sum(), leaves)
+    return image.detach().cpu().double(), [
+        (name, grad.cpu().double()) for (name, _), grad in zip(named, grads, strict=True)
+    ]
+
+
+def on_device(scene, size, channels=4):
+    def composite(tensors, width, height):
+        return triton_fused.composite(tensors, width, height, channels)
+
+    return outcome(composite, from_scene(scene, device=DEVICE), size)
+
+
+def assert_same_function(scene, size, channels=4):
+    exact = from_scene(scene, torch.float64)
+    image, grads = outcome(lambda *arguments: reference.composite(*arguments)[:channels], exact, size)
+    fast_image, fast_grads = on_device(scene, size, channels)
+    assert fast_image.shape == (channels, size[1], size[0])
+    assert float((image - fast_image).abs().max()) <= VALUES
+    largest: dict[str, float] = {}
+    for name, grad in grads:
+        largest[name] = max(largest.get(name, 0.1), float(grad.abs().max()))
+    for (name, grad), (_, fast_grad) in zip(grads, fast_grads, strict=True):
+        assert float((grad - fast_grad).abs().max()) <= GRADIENTS * largest[name], name
+
+
+@pytest.mark.parametrize("compositing", ["over", "additive"])
+@pytest.mark.parametrize(
+    ("size", "layers", "transparent", "channels"),
+    [
+        ((37, 21), 15, False, 4),
+        ((37, 21), 9, True, 4),
+        ((33, 17), 10, False, 3),
+        ((1, 1), 15, False, 4),
+        ((1, 37), 6, True, 3),
+        ((16, 16), 6, False, 4),
+    ],
+)
+def test_same_function_as_the_reference(compositing, size, layers, transparent, channels):
+    width, height = size
+    scene = random_scene(tuple(KINDS), compositing, layers, 1, width, height, transparent)
+    assert_same_function(scene, size, channels)
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_one_kind(kind):
+    assert_same_function(random_scene((kind,), layers=4, seed=3, width=20, height=20), (20, 20))
+
+
+def circles(*rows):
+    layers = (
+        Layer((Shape.of("circle", color, center=center, radius=radius),), falloff, opacity)
+        for center, radius, falloff, opacity, color in rows
+    )
+    return Scene(40, 24, tuple(layers), (0.2, 0.4, 0.6))
+
+
+LARGE, SMALL = ((0, 0), 3.0, 0.0, 1.0, (0.1, 0.2, 0.3)), ((0.1, 0), 0.2, 0.1, 0.5, (0.9, 0.5, 0.1))
+AWAY, SOFT = ((5, 5), 0.2, 0.1, 1.0, (0.9, 0.5, 0.1)), ((0, 0.5), 0.3, 2.0, 0.3, (0, 1, 0))
+TINY = ((0.3, 0.3), 1e-5, 0.0, 1.0, (1, 1, 1))
+
+
+@pytest.mark.parametrize(
+    "scene",
+    [
+        circles(LARGE, SMALL),
+        circles(SMALL, LARGE),
+        circles(SMALL, LARGE, SOFT),
+        circles(AWAY),
+        circles(TINY, SOFT),
+    ],
+    ids=["opaque below", "opaque on top", "opaque between", "off the canvas", "tiny and very soft"],
+)
+def test_special_scenes(scene):
+    assert_same_function(scene, (40, 24))
+
+
+def test_a_scene_without_layers():
+    image = triton_fused.composite(from_scene(Scene(3, 2, (), (0.25, 0.5, 0.75)), device=DEVICE), 3, 2)
+    assert image[:, 1, 2].tolist() == [0.25, 0.5, 0.75, 1.0]
+
+
+def test_equal_input_gives_equal_output_also_in_chunks_of_tiles(monkeypatch):
+    scene = random_scene(layers=6, seed=6)
+    results = []
+    for scratch in (triton_fused.SCRATCH, triton_fused.SCRATCH, 4 * 4096):
+        monkeypatch.setattr(triton_fused, "SCRATCH", scratch)
+        image, grads = on_device(scene, (40, 30))
+        results.append([image, *(grad for _, grad in grads)])
+    for other in results[1:]:
+        assert all(torch.equal(a, b) for a, b in zip(results[0], other, strict=True))
+
+
+@pytest.mark.parametrize(
+    ("starts", "most", "chunks"),
+    [
+        ([0, 2, 5, 5, 9], 9, [(0, 4, 9)]),
+        ([0, 2, 5, 5, 9], 5, [(0, 3, 5), (3, 1, 4)]),
+        ([0, 2, 5, 5, 9], 0, [(0, 1, 2), (1, 1, 3), (2, 1, 0), (3, 1, 4)]),
+        ([0, 0], 0, [(0, 1, 0)]),
+    ],
+)
+def test_chunks_of_tiles(starts, most, chunks):
+    room = torch.empty(starts[-1])
+    bins = triton_fused._Bins(torch.tensor(starts), torch.empty(len(starts) - 1), room, room, room, room)
+    assert triton_fused._chunks(bins, most) == chunks
+
+
+def bins_of(composite, tensors):
+    tensors.background.requires_grad_()
+    return composite(tensors, 80, 64).grad_fn.bins
+
+
+def test_bins_are_those_of_the_cpu():
+    """Up to rounding: a layer that only just touches a tile may be in one and not in the other."""
+    scene = random_scene(tuple(KINDS), layers=30, seed=21, unions={})
+    tensors = from_scene(scene, device=DEVICE)
+    bins, wanted = bins_of(triton_fused.composite, tensors), bins_of(fused.composite, from_scene(scene))
+    order = torch.cat([group.order for group in tensors.groups])
+    starts, layers = bins.starts.tolist(), order[bins.layers.long()].tolist()
+    for tile, (start, end) in enumerate(pairwise(starts)):
+        ours, theirs = layers[start:end], wanted.layers[wanted.starts[tile] : wanted.starts[tile + 1]]
+        assert ours == sorted(ours)
+        assert len(set(ours) ^ set(theirs.tolist())) <= 1
+
+
+# --- texts and files ---------------------------------------------------------------------------------------
+
+
+def test_a_text_holds_only_the_kinds_it_is_for():
+    text = triton_kernels.text((LayerKind("circle", 1),), "over", 3)
+    assert "# circle, 1 joined" in text
+    assert not any(f"# {kind}," in text for kind in KINDS if kind != "circle")
+    compile(text, "kernels", "exec")
+
+
+def test_without_a_cache_folder_kernels_are_in_a_temporary_file(tmp_path, monkeypatch):
+    (tmp_path / "file").write_text("not a folder")
+    monkeypatch.setenv("SDF2VEC_CACHE", str(tmp_path / "file" / "inside"))
+    compiled._warn_once.cache_clear()
+    with pytest.warns(RuntimeWarning, match="anew in every run"):
+        module = compiled.load_file(
+            f"{triton_kernels.text((LayerKind('circle', 1),), 'over', 4)}# {tmp_path}"
+        )
+    assert module.__file__ is not None
+    assert "def forward_tiles" in Path(module.__file__).read_text()
+
+
+COMPILE = """
+import sys
+import triton
+from triton.backends.compiler import GPUTarget
+from triton.compiler import ASTSource
+from sdf2vec.render import triton_kernels
+from sdf2vec.render.kernels import LayerKind
+
+POINTERS = "starts visible layers kinds places layer_starts ranges full".split()
+NUMBERS = "width height columns lines first_tile".split()
+LONG = "groups order ends keys".split()
+
+
+def signature(name):
+    if name in ("pixel", "WIDTH"):
+        return {"pixel": "fp32", "WIDTH": "constexpr"}[name]
+    return "i32" if name in NUMBERS else "*i32" if name in POINTERS else "*i64" if name in LONG else "*fp32"
+
+
+layers = tuple(LayerKind(*kind) for kind in (("circle", 1), ("box", 1), ("triangle", 1), ("displaced", 2)))
+for compositing, channels in (("over", 4), ("additive", 3)):
+    module = triton_kernels.load(layers, compositing, channels)
+    for name in ("measure_layers", "find_pairs", "forward_tiles", "backward_tiles", "reduce_pairs"):
+        kernel = getattr(module, name)
+        types = {argument: signature(argument) for argument in kernel.arg_names}
+        constants = {"WIDTH": 32} if "WIDTH" in types else {}
+        source = ASTSource(fn=kernel, signature=types, constexprs=constants)
+        options = {"num_warps": 4, "enable_fp_fusion": True}
+        machine = triton.compile(source, target=GPUTarget("cuda", 80, 32), options=options)
+        print(name, len(machine.asm["cubin"]) > 0)
+"""
+
+
+def test_kernels_compile_for_a_gpu_that_is_not_there(tmp_path):
+    """The interpreter takes what the compiler refuses (types, branches); this takes all the way to machine code."""
+    environment = {**os.environ, "SDF2VEC_CACHE": str(tmp_path), "TRITON_CACHE_DIR": str(tmp_path / "triton")}
+    environment.pop("TRITON_INTERPRET", None)
+    result = subprocess.run(
+        [sys.executable, "-c", COMPILE], env=environment, capture_output=True, text=True, check=False
+    )
+    assert result.returncode == 0, result.stderr
+    assert result.stdout.split()[1::2] == ["True"] * 10
