@@ -4,6 +4,7 @@ import os
 import resource
 import stat
 import tempfile
+from contextlib import contextmanager
 from pathlib import Path
 
 import pytest
@@ -31,13 +32,15 @@ def unprivileged_folder():
         os.seteuid(0)
 
 
-@pytest.fixture
+@contextmanager
 def small_disk():
-    """Writes of more than 1000 bytes fail part-way with an OSError, as on a full disk."""
+    """Writes of more than 1000 bytes fail part-way with an OSError, as on a full disk: pytest's own too."""
     soft, hard = resource.getrlimit(resource.RLIMIT_FSIZE)
     resource.setrlimit(resource.RLIMIT_FSIZE, (1000, hard))
-    yield
-    resource.setrlimit(resource.RLIMIT_FSIZE, (soft, hard))
+    try:
+        yield
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, (soft, hard))
 
 
 def refusal(path, data=b"x"):
@@ -77,10 +80,12 @@ def test_permissions_follow_the_umask(tmp_path, mask):
     assert stat.S_IMODE((tmp_path / "out.svg").stat().st_mode) == 0o666 & ~mask
 
 
-def test_a_write_that_fails_half_way_leaves_the_old_file_alone(tmp_path, small_disk):
+def test_a_write_that_fails_half_way_leaves_the_old_file_alone(tmp_path):
     target = tmp_path / "out.svg"
     write_atomically(target, b"old")
-    assert "out.svg: cannot write it (File too large)" in refusal(target, b"x" * 100_000)
+    with small_disk():
+        message = refusal(target, b"x" * 100_000)
+    assert "out.svg: cannot write it (File too large)" in message
     assert target.read_bytes() == b"old"
     assert os.listdir(tmp_path) == ["out.svg"]
 

@@ -220,3 +220,29 @@ def test_large_scenes_are_drawn_by_the_fused_renderer_and_look_the_same(monkeypa
     assert torch.equal(dense, reference.render(scene, 50, 40))
     monkeypatch.setattr(draw, "LARGE", 0)
     assert 0.0 < float((draw.draw(scene, 50, 40) - dense).abs().max()) <= VALUES
+
+
+FIT = """
+import sys, hashlib, numpy, torch, sdf2vec
+from sdf2vec.render import draw, fused
+from sdf2vec.render.tensors import from_scene
+pixels = numpy.random.default_rng(0).random((40, 60, 3))
+if sys.argv[1] == "draw first":
+    one = sdf2vec.Shape.of("circle", (1, 0, 0), center=(0, 0), radius=0.3)
+    with torch.no_grad():
+        fused.composite(from_scene(sdf2vec.Scene(9, 9, (sdf2vec.Layer((one,), 0.1),))), 9, 9)
+print(hashlib.sha256(sdf2vec.dumps(sdf2vec.fit(pixels, 9, kind="circle", preset="fast")).encode()).hexdigest())
+"""
+
+
+def test_kernels_from_disk_and_fresh_ones_give_the_same_scene(tmp_path):
+    """Kernels compiled now, read back, or compiled partly in another run: the same digits."""
+    runs = [("new", "fit"), ("new", "fit"), ("partly", "draw first"), ("partly", "fit")]
+    results = []
+    for folder, what in runs:
+        environment = {**os.environ, "SDF2VEC_CACHE": str(tmp_path / folder)}
+        command = [sys.executable, "-c", FIT, what]
+        results.append(
+            subprocess.run(command, env=environment, capture_output=True, text=True, check=True).stdout
+        )
+    assert len(set(results)) == 1

@@ -27,15 +27,12 @@ class Dissimilarity:
         self.across, self.down = (
             gaussian_window(side).numpy().astype(np.float32) for side in (width, height)
         )
-        self.mean = np.stack([self._smooth(channel) for channel in self.target])
-        self.square = np.stack([self._smooth(channel * channel) for channel in self.target])
-
-    def _smooth(self, channel: Floats) -> Floats:
-        height, width = channel.shape
-        rows = np.empty((height, width - len(self.across) + 1), np.float32)
-        out = np.empty((height - len(self.down) + 1, rows.shape[1]), np.float32)
-        self.kernels.smooth(channel, self.across, self.down, rows, out)
-        return out
+        self.mean = np.stack(
+            [self.kernels.local_means(channel, self.across, self.down) for channel in self.target]
+        )
+        self.square = np.stack(
+            [self.kernels.local_means(channel * channel, self.across, self.down) for channel in self.target]
+        )
 
     def __call__(self, render: torch.Tensor) -> torch.Tensor:
         value: torch.Tensor = _Function.apply(self, render)

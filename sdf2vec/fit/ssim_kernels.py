@@ -7,12 +7,9 @@ import numpy as np
 from numba import njit
 
 f32 = np.float32
-OPTIONS = {
-    "fastmath": {"reassoc", "nsz", "arcp", "contract", "afn"},
-    "error_model": "numpy",
-    "nogil": True,
-    "cache": CACHE,  # type: ignore[name-defined]  # noqa: F821 (filled in by whoever compiles this)
-}
+SAME = {"fastmath": {"reassoc", "nsz", "arcp", "contract", "afn"}, "error_model": "numpy", "nogil": True}
+# inlined, and only what is called from outside is kept on disk: see `lower.numba`
+OPTIONS, ENTRY = {**SAME, "forceinline": True}, {**SAME, "cache": CACHE}  # noqa: F821 (filled in when compiled)
 C1, C2 = f32(0.01**2), f32(0.03**2)
 TWO = f32(2)
 
@@ -47,7 +44,16 @@ def spread(source, across, down, rows, out):
                 out[y, x + k] += across[k] * rows[y, x]
 
 
-@njit(**OPTIONS)
+@njit(**ENTRY)
+def local_means(source, across, down):
+    """The means of one channel over all places of the window."""
+    rows = np.empty((source.shape[0], source.shape[1] - across.size + 1), f32)
+    out = np.empty((source.shape[0] - down.size + 1, rows.shape[1]), f32)
+    smooth(source, across, down, rows, out)
+    return out
+
+
+@njit(**ENTRY)
 def similarity(a, b, mean_b, square_b, across, down, grad):
     """Σ SSIM of one channel over all places of the window; `grad` becomes its derivative by a."""
     height, width = a.shape

@@ -25,9 +25,10 @@ from numpy import log, sqrt
 
 f32 = np.float32
 ZERO, ONE, QUARTER, LEAST = f32(0), f32(1), f32(1.5707963267948966), f32(1e-30)
-OPTIONS = dict(
-    fastmath={"reassoc", "nsz", "arcp", "contract", "afn"}, error_model="numpy", nogil=True, cache=CACHE
-)
+SAME = {"fastmath": {"reassoc", "nsz", "arcp", "contract", "afn"}, "error_model": "numpy", "nogil": True}
+# Everything is inlined into what is called from outside, and only that is kept on disk: else a fresh compilation
+# and one from disk could link different copies of a function, which differ in the last digits.
+OPTIONS, ENTRY = {**SAME, "forceinline": True}, {**SAME, "cache": CACHE}
 _T = [f32(v) for v in (
     4.89352455891786e-03, 6.37261928875436e-04, 1.48572235717979e-05, 5.12229709037114e-08,
     -8.60467152213735e-11, 2.00018790482477e-13, -2.76076847742355e-16,
