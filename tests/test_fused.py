@@ -164,17 +164,17 @@ def test_fused_ssim_is_the_metric(shape):
 
 
 def test_a_text_holds_only_the_kinds_it_is_for():
-    text = kernels.text((LayerKind("circle", 1),), "over")
+    text = kernels.text((LayerKind("circle", 1),), "over", 3)
     assert "# circle, 1 joined" in text
     assert not any(f"# {kind}," in text for kind in KINDS if kind != "circle")
 
 
 def test_the_cache_key_changes_with_the_formula(monkeypatch):
-    before = compiled.path_of(kernels.text((LayerKind("circle", 1),), "over"))
-    assert before == compiled.path_of(kernels.text((LayerKind("circle", 1),), "over"))
-    assert before != compiled.path_of(kernels.text((LayerKind("circle", 1),), "additive"))
+    before = compiled.path_of(kernels.text((LayerKind("circle", 1),), "over", 3))
+    assert before == compiled.path_of(kernels.text((LayerKind("circle", 1),), "over", 3))
+    assert before != compiled.path_of(kernels.text((LayerKind("circle", 1),), "additive", 3))
     monkeypatch.setattr("numba.__version__", "0")
-    assert before != compiled.path_of(kernels.text((LayerKind("circle", 1),), "over"))
+    assert before != compiled.path_of(kernels.text((LayerKind("circle", 1),), "over", 3))
 
 
 RUN = """
@@ -209,7 +209,7 @@ def test_without_a_cache_folder_kernels_work_with_one_warning(tmp_path):
 
 
 def test_kernel_text_is_plain_python():
-    text = kernels.text(tuple(LayerKind(kind, size) for kind in KINDS for size in (1, 2)), "over")
+    text = kernels.text(tuple(LayerKind(kind, size) for kind in KINDS for size in (1, 2)), "over", 4)
     compile(text, "kernels", "exec")
     assert "{{" not in text
 

@@ -78,7 +78,7 @@ def numba_operations():
     for name, meaning in MEANINGS.items():
         inputs = tuple(ARGUMENTS[: meaning.arity])
         outputs = scalarize(meaning.build(*inputs))
-        blocks[name] = numba_lowering.forward(numba_lowering.Block(f"op_{name}", outputs, inputs, ()), size)
+        blocks[name] = numba_lowering.forward(numba_lowering.Block(f"op_{name}", outputs, inputs, ()))
     return compiled.load("\n\n".join([numba_lowering.PREAMBLE, *blocks.values()])), size
 
 
@@ -92,7 +92,7 @@ def test_numba(name, numba_operations):
         np.empty(size, np.float32) for _ in range(meaning.build(*ARGUMENTS[: meaning.arity]).type.width)
     ]
     columns = [np.ascontiguousarray(column) for column in repeated.T]
-    getattr(module, f"op_{name}")(np.empty(0, np.float32), *columns, *outputs)
+    getattr(module, f"op_{name}")(np.empty(0, np.float32), np.uint64(0), np.uint64(size), *columns, *outputs)
     got, want = np.stack(outputs)[:, : len(cases)], expected(meaning, cases)
     size_of = np.abs(cases).max(axis=1) if name in ("add", "sub", "mix", "dot") else 1.0
     scale = np.maximum(np.abs(want), size_of**2 if name == "dot" else size_of)

@@ -65,7 +65,7 @@ def fit_picture(picture: Picture, settings: Settings, callback: Callback = lambd
     start = scaled(pixels, phases[0].resolution)
     tensors = place(start, size, settings.kinds, settings.shapes, settings.compositing, generator)
     with threads_of_its_own():
-        if device.name == "cpu" and not is_compiled(tensors):
+        if device.name == "cpu" and not is_compiled(tensors, start.shape[0]):
             callback(Progress("compiling kernels (once)", 0, sum(phase.steps for phase in phases), math.nan))
         tensors = on_device(tensors, device.name)
         optimise(tensors, pixels, phases, callback, device)

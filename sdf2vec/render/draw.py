@@ -6,7 +6,7 @@ import torch
 
 from ..scene import Scene
 from . import fused, reference
-from .tensors import from_scene
+from .tensors import SceneTensors, from_scene
 
 LARGE = 1 << 25  # layers × pixels from which compiling kernels pays
 
@@ -17,4 +17,12 @@ def draw(scene: Scene, width: int | None = None, height: int | None = None) -> t
     if len(scene.layers) * width * height < LARGE:
         return reference.render(scene, width, height)
     with torch.no_grad():
-        return reference.displayed(fused.composite(from_scene(scene), width, height))
+        return reference.displayed(_composite(from_scene(scene), width, height))
+
+
+def _composite(tensors: SceneTensors, width: int, height: int) -> torch.Tensor:
+    """Over an opaque background the picture is opaque: the kernels of a fit, of 3 channels, are enough."""
+    if tensors.transparent or tensors.compositing != "over":
+        return fused.composite(tensors, width, height)
+    color = fused.composite(tensors, width, height, 3)
+    return torch.cat([color, torch.ones_like(color[:1])])

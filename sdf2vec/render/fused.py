@@ -38,23 +38,20 @@ def composite(tensors: SceneTensors, width: int, height: int, channels: int = 4)
     """
     if not tensors.groups:
         return tensors.background[:channels, None, None].expand(channels, height, width)
-    canvas, rows = _canvas(tensors, width, height)
-    order = _draw_order(tensors)
-    colors = torch.cat([group.colors[:, 0] for group in tensors.groups])[order]
-    opacity = torch.cat([group.opacity for group in tensors.groups])[order]
-    image: torch.Tensor = _Composite.apply(canvas, channels, rows, colors, opacity, tensors.background)
+    canvas, rows = _canvas(tensors, width, height, channels)
+    image: torch.Tensor = _Composite.apply(canvas, rows, tensors.background)
     return image
 
 
-def _canvas(tensors: SceneTensors, width: int, height: int) -> tuple[_Canvas, torch.Tensor]:
-    """What a render needs, and the layers' rows of uniforms in draw order."""
+def _canvas(tensors: SceneTensors, width: int, height: int, channels: int) -> tuple[_Canvas, torch.Tensor]:
+    """What a render needs, and the layers' rows of numbers in draw order."""
     axes = canvas_axes(tensors, -(-width // TILE) * TILE, -(-height // TILE) * TILE, width, height)
     kinds = kinds_of(tensors)
-    module = kernels.load(kinds, tensors.compositing)
+    module = kernels.load(kinds, tensors.compositing, channels)
     order = _draw_order(tensors)
     index = np.repeat(np.arange(len(kinds)), [len(group.order) for group in tensors.groups])[order.numpy()]
-    canvas = _Canvas(module, index, width, height, *axes, hides=tensors.compositing == "over")
-    return canvas, _rows(tensors.groups, float(axes[2]))[order]
+    canvas = _Canvas(module, index, channels, width, height, *axes, hides=tensors.compositing == "over")
+    return canvas, rows_of(tensors.groups, float(axes[2]))[order]
 
 
 def _draw_order(tensors: SceneTensors) -> torch.Tensor:
@@ -67,9 +64,9 @@ def kinds_of(tensors: SceneTensors) -> tuple[LayerKind, ...]:
     return tuple(LayerKind(group.kind, group.union_size) for group in tensors.groups)
 
 
-def is_compiled(tensors: SceneTensors) -> bool:
+def is_compiled(tensors: SceneTensors, channels: int) -> bool:
     """Whether the kernels for this scene are there; if not, the first render takes some seconds."""
-    return not tensors.groups or kernels.is_compiled(kinds_of(tensors), tensors.compositing)
+    return not tensors.groups or kernels.is_compiled(kinds_of(tensors), tensors.compositing, channels)
 
 
 @contextmanager
@@ -85,12 +82,12 @@ def threads_of_its_own() -> Iterator[None]:
 
 def bins_of(tensors: SceneTensors, width: int, height: int) -> Bins:
     """Which layers touch each tile of a canvas of this size."""
-    canvas, rows = _canvas(tensors, width, height)
+    canvas, rows = _canvas(tensors, width, height, 3)
     return _bin(canvas, _array(rows))
 
 
-def _rows(groups: list[Group], pixel: float) -> torch.Tensor:
-    """One row of uniforms a layer, [L, widest], in the order that `kernels.Formula.uniforms` has them."""
+def rows_of(groups: list[Group], pixel: float) -> torch.Tensor:
+    """One row of numbers a layer, [L, widest]: `kernels.LOOK`, then `kernels.Formula.uniforms`."""
     rows = [_group_rows(group, pixel) for group in groups]
     widest = max(row.shape[1] for row in rows)
     return torch.cat([torch.nn.functional.pad(row, (0, widest - row.shape[1])) for row in rows])
@@ -98,7 +95,8 @@ def _rows(groups: list[Group], pixel: float) -> torch.Tensor:
 
 def _group_rows(group: Group, pixel: float) -> torch.Tensor:
     shapes = torch.cat(list(group.parameters.values()), dim=2).flatten(1)  # [G, K·P], shape by shape
-    head = [torch.full_like(group.falloff, pixel)[:, None], group.falloff[:, None]]
+    pixels = torch.full_like(group.falloff, pixel)
+    head = [group.colors[:, 0], *(x[:, None] for x in (group.opacity, pixels, group.falloff))]
     if group.union_size == 1:
         return torch.cat([*head, shapes], dim=1)
     return torch.cat([*head, group.smoothness[:, None], shapes, group.colors.flatten(1)], dim=1)
@@ -110,6 +108,7 @@ class _Canvas:
 
     module: ModuleType
     kinds: NDArray[np.int64]  # [L]
+    channels: int
     width: int
     height: int
     x: Floats  # of the pixel centres, padded to whole tiles
@@ -132,49 +131,33 @@ class Bins:
 
     starts: NDArray[np.int64]
     layers: NDArray[np.int32]
-    full: NDArray[np.bool_]  # the layer covers all of the tile
+    spans: NDArray[np.int32]  # [pairs, 2] rows of the tile that the layer may touch; 0, 0 where it covers it
 
 
-def _bin(canvas: _Canvas, uniforms: Floats) -> Bins:
+def _bin(canvas: _Canvas, rows: Floats) -> Bins:
     module, count = canvas.module, len(canvas.kinds)
-    limits, ranges = np.empty((count, 3), np.float32), np.empty((count, 4), np.int64)
+    limits, ranges = np.empty((count, 5), np.float32), np.empty((count, 4), np.int64)
     place = (canvas.x, canvas.y, canvas.pixel, canvas.columns)
-    most = module.measure(canvas.kinds, uniforms, *place, canvas.rows, limits, ranges)
-    tiles, layers, full = np.empty(most, np.int32), np.empty(most, np.int32), np.empty(most, np.bool_)
-    pairs = module.find_pairs(canvas.kinds, uniforms, *place, limits, ranges, tiles, layers, full)
+    most = module.measure(canvas.kinds, rows, *place, canvas.rows, limits, ranges)
+    tiles, layers, spans = np.empty(most, np.int32), np.empty(most, np.int32), np.empty((most, 2), np.int32)
+    pairs = module.find_pairs(canvas.kinds, rows, *place, limits, ranges, tiles, layers, spans)
     starts = np.zeros(canvas.columns * canvas.rows + 1, np.int64)
-    sorted_layers, sorted_full = np.empty(pairs, np.int32), np.empty(pairs, np.bool_)
-    module.sort_pairs(pairs, tiles, layers, full, starts, sorted_layers, sorted_full)
-    return Bins(starts, sorted_layers, sorted_full)
+    sorted_layers, sorted_spans = np.empty(pairs, np.int32), np.empty((pairs, 2), np.int32)
+    module.sort_pairs(pairs, tiles, layers, spans, starts, sorted_layers, sorted_spans)
+    return Bins(starts, sorted_layers, sorted_spans)
 
 
 class _Composite(torch.autograd.Function):
     """The kernels as one differentiable operation."""
 
     @staticmethod
-    def forward(
-        ctx: Any,
-        canvas: _Canvas,
-        channels: int,
-        uniforms: torch.Tensor,
-        colors: torch.Tensor,
-        opacity: torch.Tensor,
-        background: torch.Tensor,
-    ) -> torch.Tensor:
-        arrays = [_array(tensor) for tensor in (uniforms, colors, opacity, background)]
-        bins = _bin(canvas, arrays[0])
-        image = np.empty((channels, canvas.height, canvas.width), np.float32)
-        shared = (
-            bins.starts,
-            bins.layers,
-            bins.full,
-            canvas.kinds,
-            *arrays,
-            canvas.hides,
-            canvas.x,
-            canvas.y,
-        )
-        _in_threads(canvas.module.forward_tiles, *shared, canvas.columns, image)
+    def forward(ctx: Any, canvas: _Canvas, rows: torch.Tensor, background: torch.Tensor) -> torch.Tensor:
+        numbers = _array(rows)
+        bins = _bin(canvas, numbers)
+        image = np.empty((canvas.channels, canvas.height, canvas.width), np.float32)
+        place = (canvas.hides, canvas.x, canvas.y, canvas.columns)
+        shared = (bins.starts, bins.layers, bins.spans, canvas.kinds, numbers, _array(background), *place)
+        _in_threads(canvas.module.forward_tiles, *shared, image)
         ctx.canvas, ctx.bins, ctx.shared = canvas, bins, shared
         return torch.from_numpy(image)
 
@@ -182,19 +165,14 @@ class _Composite(torch.autograd.Function):
     @once_differentiable
     def backward(ctx: Any, seed: torch.Tensor) -> tuple[torch.Tensor | None, ...]:
         canvas, bins = ctx.canvas, ctx.bins
-        uniforms = ctx.shared[4]
-        row = uniforms.shape[1]
-        longest = int(np.diff(bins.starts).max(initial=0))
-        grads = np.zeros((len(bins.layers), row + 4), np.float32)
+        width, longest = ctx.shared[4].shape[1], int(np.diff(bins.starts).max(initial=0))
+        grads = np.zeros((len(bins.layers), width), np.float32)
         ground = np.zeros((len(bins.starts) - 1, 4), np.float32)
-        _in_threads(
-            canvas.module.backward_tiles, *ctx.shared, canvas.columns, _array(seed), longest, grads, ground
-        )
-        totals = np.zeros((len(uniforms), row + 4), np.float64)
+        _in_threads(canvas.module.backward_tiles, *ctx.shared, _array(seed), longest, grads, ground)
+        totals = np.zeros((len(canvas.kinds), width), np.float64)
         canvas.module.reduce_pairs(bins.layers, grads, totals)
-        totals_32 = torch.from_numpy(totals.astype(np.float32))
-        background = torch.from_numpy(ground.sum(axis=0, dtype=np.float64).astype(np.float32))
-        return None, None, totals_32[:, :row], totals_32[:, row : row + 3], totals_32[:, row + 3], background
+        background = ground.sum(axis=0, dtype=np.float64)
+        return None, *(torch.from_numpy(part.astype(np.float32)) for part in (totals, background))
 
 
 def _array(tensor: torch.Tensor) -> Floats:

@@ -10,7 +10,7 @@ from types import ModuleType
 from typing import NamedTuple
 
 from ..blend import COMPOSITING, coverage, reach, saturation, smooth_union, union_reach
-from ..expr import VEC2, VEC3, VEC4, Expr, components_of, maximum, minimum, scalarize, var
+from ..expr import VEC2, VEC3, VEC4, Expr, components_of, const, maximum, minimum, scalarize, var
 from ..lower.numba import PREAMBLE, Block, backward, forward, scalar
 from ..shapes import KINDS
 from ..templating import template
@@ -18,6 +18,10 @@ from . import compiled
 
 TILE = 16  # pixels along a side of a tile, the block that kernels work on
 PIXELS = TILE * TILE
+
+
+BELOW, TINT, OPACITY = var("below", VEC4), var("color", VEC3), var("opacity")
+LOOK = (*components_of(TINT), OPACITY)  # a layer's row of numbers begins with these; then `Formula.uniforms`
 
 
 class LayerKind(NamedTuple):
@@ -43,18 +47,20 @@ class Formula:
 
     @property
     def uniforms(self) -> tuple[Expr, ...]:
-        """A layer's row: pixel, falloff, (smoothness,) parameters, (colours)."""
+        """What its coverage needs: pixel, falloff, (smoothness,) parameters, (colours)."""
         scalars = tuple(s for row in self.parameters for v in row for s in components_of(v))
         if self.size == 1:
             return (self.pixel, self.falloff, *scalars)
         colors = (s for color in self.colors for s in components_of(color))
         return (self.pixel, self.falloff, self.smoothness, *scalars, *colors)
 
-    def block(self, name: str) -> Block:
-        """Coverage of a block of pixels; for a union its three colour channels too."""
-        cover = scalarize(coverage(self.distance, self.falloff, self.pixel))
-        color = scalarize(self.color) if self.size > 1 else ()
-        return Block(name, (*cover, *color), components_of(self.point), self.uniforms)
+    def drawn(self, name: str, compositing: str, channels: int) -> Block:
+        """What a block of pixels becomes when the layer is laid on it, of one row of numbers (see `LOOK`)."""
+        color = TINT if self.size == 1 else self.color
+        cover = coverage(self.distance, self.falloff, self.pixel)
+        below = COMPOSITING[compositing](BELOW, color, OPACITY, cover)
+        varying = (*components_of(self.point), *flows_of(channels))
+        return Block(name, scalarize(below)[:channels], varying, (*LOOK, *self.uniforms))
 
     def bounds(self) -> tuple[Expr, ...]:
         """Box (low x, low y, high x, high y), distance from which coverage is 0, up to which 1, slope."""
@@ -69,83 +75,49 @@ class Formula:
         return (*box, *scalarize(outer), *scalarize(inner), *scalarize(slope))
 
 
-def text(layers: tuple[LayerKind, ...], compositing: str) -> str:
-    """The whole module for these kinds of layer."""
-    parts = [PREAMBLE, *_blend_text(compositing)]
+def flows_of(channels: int) -> tuple[Expr, ...]:
+    """The channels of what lies below a layer."""
+    return components_of(BELOW)[:channels]
+
+
+def solid(compositing: str, channels: int) -> Block:
+    """What a block of pixels becomes when a layer that covers all of it is laid on it."""
+    below = COMPOSITING[compositing](BELOW, TINT, OPACITY, const(1.0))
+    return Block("solid", scalarize(below)[:channels], flows_of(channels), LOOK)
+
+
+def text(layers: tuple[LayerKind, ...], compositing: str, channels: int) -> str:
+    """The whole module for these kinds of layer and 3 or 4 channels of colour."""
+    parts = [PREAMBLE, *_both_ways(solid(compositing, channels), channels)]
     for index, layer in enumerate(layers):
         formula = Formula(layer)
-        block = formula.block(f"layer{index}")
+        row, point = (*LOOK, *formula.uniforms), components_of(formula.point)
         parts += [
             f"# {layer.kind}, {layer.union_size} joined",
-            forward(block, PIXELS),
-            backward(block, PIXELS),
-            scalar(f"bounds{index}", formula.bounds(), (), formula.uniforms),
-            scalar(
-                f"distance{index}",
-                scalarize(formula.distance),
-                components_of(formula.point),
-                formula.uniforms,
-            ),
+            *_both_ways(formula.drawn(f"layer{index}", compositing, channels), channels),
+            scalar(f"bounds{index}", formula.bounds(), (), row),
+            scalar(f"distance{index}", scalarize(formula.distance), point, row),
         ]
-    driver = template("tiles.py.jinja").render(tile=TILE, pixels=PIXELS, farthest=(TILE - 1) / 2 * 2**0.5)
-    return "\n\n".join([*parts, _dispatch_text(layers), driver])
-
-
-def _blend_text(compositing: str) -> list[str]:
-    """Laying a channel of colour (uniform, or varying in a union) or alpha on what is below."""
-    below, color, opacity, cover = var("below", VEC4), var("color", VEC3), var("opacity"), var("cover")
-    red, _, _, alpha = scalarize(COMPOSITING[compositing](below, color, opacity, cover))
-    tint, below_red, below_alpha = components_of(color)[0], components_of(below)[0], components_of(below)[3]
-    blocks = (
-        (Block("blend_color", (red,), (below_red, cover), (tint, opacity)), (below_red, cover)),
-        (Block("blend_tint", (red,), (below_red, cover, tint), (opacity,)), (below_red, cover, tint)),
-        (Block("blend_alpha", (alpha,), (below_alpha, cover), (opacity,)), (below_alpha, cover)),
+    driver = template("tiles.py.jinja").render(
+        tile=TILE,
+        pixels=PIXELS,
+        farthest=(TILE - 1) / 2 * 2**0.5,
+        channels=channels,
+        unions=[layer.union_size > 1 for layer in layers],
     )
-    return [
-        part for block, flows in blocks for part in (forward(block, PIXELS), backward(block, PIXELS, flows))
-    ]
+    return "\n\n".join([*parts, driver])
 
 
-def _dispatch_text(layers: tuple[LayerKind, ...]) -> str:
-    """One function per task that picks the kernel of a layer by its index."""
-    simple = [i for i, layer in enumerate(layers) if layer.union_size == 1]
-    unions = [i for i, layer in enumerate(layers) if layer.union_size > 1]
-    tints = ", ".join(f"tint[{c}]" for c in range(3))
-    seeds = ", ".join(f"tint_seed[{c}]" for c in range(3))
-    return "\n\n".join(
-        [
-            f"IS_UNION = np.array({[layer.union_size > 1 for layer in layers]})\nANY_UNION = {bool(unions)}",
-            _cases("bounds", "u", [(i, f"return bounds{i}(u)") for i in range(len(layers))]),
-            _cases("distance", "u, x, y", [(i, f"return distance{i}(u, x, y)") for i in range(len(layers))]),
-            _cases(
-                "layer",
-                "u, x, y, cover, tint",
-                [(i, f"layer{i}(u, x, y, cover)") for i in simple]
-                + [(i, f"layer{i}(u, x, y, cover, {tints})") for i in unions],
-            ),
-            _cases(
-                "layer_backward",
-                "u, x, y, seed, tint_seed, grad",
-                [(i, f"layer{i}_backward(u, x, y, seed, grad)") for i in simple]
-                + [(i, f"layer{i}_backward(u, x, y, seed, {seeds}, grad)") for i in unions],
-            ),
-        ]
-    )
-
-
-def _cases(name: str, arguments: str, cases: list[tuple[int, str]]) -> str:
-    *others, (_, last) = cases
-    lines = [f"    if kind == {index}:\n        {line}\n        return" for index, line in others]
-    lines = [line.removesuffix("\n        return") if "return " in line else line for line in lines]
-    return "\n".join(["@njit(**OPTIONS)", f"def {name}(kind, {arguments}):", *lines, f"    {last}"]) + "\n"
+def _both_ways(block: Block, channels: int) -> tuple[str, str]:
+    return forward(block, flows_of(channels)), backward(block, flows_of(channels))
 
 
 @cache
-def load(layers: tuple[LayerKind, ...], compositing: str) -> ModuleType:
-    """The compiled module for these kinds of layer."""
-    return compiled.load(text(layers, compositing))
+def load(layers: tuple[LayerKind, ...], compositing: str, channels: int) -> ModuleType:
+    """The compiled module for these kinds of layer and 3 or 4 channels of colour."""
+    return compiled.load(text(layers, compositing, channels))
 
 
-def is_compiled(layers: tuple[LayerKind, ...], compositing: str) -> bool:
+def is_compiled(layers: tuple[LayerKind, ...], compositing: str, channels: int) -> bool:
     """Whether these kernels have been compiled before on this machine."""
-    return compiled.is_compiled(text(layers, compositing), "backward_tiles")
+    return compiled.is_compiled(text(layers, compositing, channels), "backward_tiles")

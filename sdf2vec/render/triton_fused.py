@@ -17,7 +17,7 @@ import torch
 from torch.autograd.function import once_differentiable
 
 from . import triton_kernels
-from .fused import _rows, kinds_of
+from .fused import kinds_of, rows_of
 from .kernels import PIXELS, TILE
 from .reference import canvas_axes
 from .tensors import SceneTensors
@@ -42,9 +42,7 @@ def composite(tensors: SceneTensors, width: int, height: int, channels: int = 4)
     if not tensors.layer_count:
         return background[:channels, None, None].expand(channels, height, width)
     canvas = _canvas(tensors, width, height, channels)
-    colors = torch.cat([group.colors[:, 0] for group in tensors.groups])
-    opacity = torch.cat([group.opacity for group in tensors.groups])
-    rows = torch.cat([_rows(tensors.groups, canvas.pixel), colors, opacity[:, None]], dim=1).float()
+    rows = rows_of(tensors.groups, canvas.pixel).float()
     image: torch.Tensor = _Composite.apply(canvas, rows.contiguous(), background.contiguous())
     return image
 
@@ -141,7 +139,7 @@ def _visible(starts: torch.Tensor, hides: torch.Tensor) -> torch.Tensor:
 
 
 class _Composite(torch.autograd.Function):
-    """The kernels as one differentiable operation on the layers' rows [L, widest + 4] and the background [4]."""
+    """The kernels as one differentiable operation on the layers' rows [L, widest] and the background [4]."""
 
     @staticmethod
     def forward(ctx: Any, canvas: _Canvas, rows: torch.Tensor, background: torch.Tensor) -> torch.Tensor:
