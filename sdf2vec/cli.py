@@ -90,7 +90,7 @@ def _convert_parser() -> argparse.ArgumentParser:
     parser.add_argument("--preset", default=DEFAULT, help=f"{', '.join(PRESETS)} (default: {DEFAULT})")
     parser.add_argument("--loss", help=f"{', '.join(api.LOSS_NAMES)} (default: the preset's)")
     parser.add_argument(
-        "--device", default="auto", choices=api.DEVICES, help="where to fit (default: auto, which is the CPU)"
+        "--device", default="auto", choices=api.DEVICES, help="where to fit (default: auto, CUDA if it works)"
     )
     parser.add_argument("--seed", type=int, default=0, help="the same seed gives the same scene (default: 0)")
     _add_options(parser)

@@ -13,7 +13,7 @@ from sdf2vec.fit.placing import detail, place
 from sdf2vec.fit.presets import PRESETS, RATES
 from sdf2vec.image import Picture
 from sdf2vec.metrics import mse, psnr
-from sdf2vec.render import device
+from sdf2vec.render import culled, device, triton_fused
 from sdf2vec.render.device import Device
 from sdf2vec.render.reference import render
 from sdf2vec.render.tensors import from_scene
@@ -158,9 +158,36 @@ def test_a_device_that_is_not_there_is_refused_in_one_line():
         sdf2vec.fit(picture().pixels, 2, preset="fast", device="cuda")
 
 
+@pytest.fixture
+def torch_with_cuda(monkeypatch):
+    """A torch that claims to have CUDA; tensors made for it land on the CPU."""
+    device._cuda_that_works.cache_clear()
+    monkeypatch.setattr(torch.cuda, "is_available", lambda: True)
+    monkeypatch.setattr(device, "from_scene", lambda scene, device: from_scene(scene))
+    yield
+    device._cuda_that_works.cache_clear()
+
+
+def test_auto_takes_cuda_where_its_kernels_run(monkeypatch, torch_with_cuda):
+    monkeypatch.setattr(triton_fused, "composite", culled.composite)
+    assert device.choose("auto") == Device("cuda", culled.composite)
+
+
+def test_auto_takes_the_cpu_and_says_why_where_cudas_kernels_fail(monkeypatch, torch_with_cuda):
+    def fails(*arguments):
+        raise RuntimeError("no kernel image is available\nlong story")
+
+    monkeypatch.setattr(triton_fused, "composite", fails)
+    with pytest.warns(
+        RuntimeWarning, match=r"CUDA's kernels don't run here \(no kernel image is available\)$"
+    ):
+        assert device.choose("auto").name == "cpu"
+    assert device.choose("cuda") == Device("cuda", culled.composite)
+
+
 def test_the_dense_renderer_serves_other_devices(monkeypatch):
     """What `mps` runs, run on the CPU: nearly the same scene as the fused kernels give."""
-    monkeypatch.setattr(loop, "choose", {"mps": Device("cpu", device._dense)}.__getitem__)
+    monkeypatch.setattr(loop, "choose", {"mps": Device("cpu", culled.composite)}.__getitem__)
     pic = picture()
     scene = fit_picture(pic, Settings(4, ("circle",), preset="fast", device="mps"))
     monkeypatch.undo()

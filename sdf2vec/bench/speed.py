@@ -11,21 +11,26 @@ import argparse
 import os
 import resource
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 import torch
+from numba import njit
 
+from ..expr import Expr
 from ..files import write_atomically
 from ..fit.loop import adam
 from ..fit.losses import l1
 from ..fit.placing import place
 from ..fit.ssim import Dissimilarity
+from ..lower.block import dependent, derivatives
 from ..metrics import ssim
-from ..render import fused, reference
+from ..render import fused, kernels, reference
 from ..render.tensors import SceneTensors
 from ..shapes import KINDS
+from .chart import Chart, write
 
 
 def picture(side: int) -> torch.Tensor:
@@ -86,9 +91,12 @@ def against_dense() -> Iterator[str]:
 
 
 def per_shape_pixel() -> Iterator[str]:
-    """Forward and backward on one thread, all overhead included, per pixel inside the layers' extents."""
-    yield "| kind | ns per shape-pixel, 256 shapes at 256 px |"
-    yield "|---|---:|"
+    """Forward and backward on one thread, all overhead included."""
+    peak = multiply_add_peak()
+    yield f"Measured peak of this core: {peak:.0f} billion float32 operations a second (a multiply-add is two)."
+    yield ""
+    yield "| kind | step ms | ns per pixel in the extents | ns per covered pixel | share of the peak |"
+    yield "|---|---:|---:|---:|---:|"
     target = picture(256)
     os.environ["SDF2VEC_THREADS"] = "1"
     for kind in KINDS:
@@ -103,21 +111,72 @@ def per_shape_pixel() -> Iterator[str]:
 
         with fused.threads_of_its_own():
             spent = seconds(run)
-        yield f"| {kind} | {spent / covered_pixels(tensors, 256, 256) * 1e9:.1f} |"
+        inside, covered = pixels_in_extents(tensors, 256), covered_pixels(tensors, 256)
+        share = operations(kind) * inside / spent / 1e9 / peak
+        per = f"{spent / inside * 1e9:.1f} | {spent / covered * 1e9:.1f}"
+        yield f"| {kind} | {spent * 1e3:.2f} | {per} | {share:.0%} |"
     del os.environ["SDF2VEC_THREADS"]
 
 
-def covered_pixels(tensors: SceneTensors, width: int, height: int) -> int:
+def covered_pixels(tensors: SceneTensors, side: int) -> int:
     """Pairs of a layer and a pixel with a coverage above 0."""
-    x, y, pixel = reference.canvas(tensors, width, height)
+    x, y, pixel = reference.canvas(tensors, side, side)
     with torch.no_grad():
         return sum(int((reference.group_coverage(g, x, y, pixel)[0] > 0).sum()) for g in tensors.groups)
 
 
-def growth() -> Iterator[str]:
-    """A step by number of shapes and picture size, triangles; and the peak memory of the process so far."""
-    yield "| shapes | size | step ms | layers a pixel | peak memory MB |"
-    yield "|---:|---:|---:|---:|---:|"
+def pixels_in_extents(tensors: SceneTensors, side: int) -> float:
+    """Pairs of a layer and a pixel of the canvas in the layer's bounding box; squares have sides of 1."""
+    low, high = (edge.clamp(-0.5, 0.5) * side for edge in fused.extents_of(tensors, side, side))
+    return float((high - low).clamp(min=0).prod(dim=1).sum())
+
+
+def operations(kind: str) -> int:
+    """Float operations per pixel of a step: the layer drawn twice, and its derivatives."""
+    block = kernels.Formula(kernels.LayerKind(kind, 1)).drawn("layer", "over", 3)
+    found = derivatives(block, kernels.flows_of(3))
+    inner = dependent((*found.sums, *found.flows), (*block.varying, *found.seeds))
+    drawn = sum(map(_weight, dependent(block.outputs, block.varying)))
+    return 2 * drawn + sum(map(_weight, inner)) + len(found.sums)
+
+
+def _weight(node: Expr) -> int:
+    """How many operations the kernels spend on a node; a division or a square root counts as one."""
+    return {"var": 0, "sigmoid": 27, "sin": 20, "exp": 22, "mix": 3, "clamp": 2}.get(node.op, 1)
+
+
+def multiply_add_peak() -> float:
+    """Billions of float32 operations per second of one core, in eight chains of multiply-adds that don't wait."""
+
+    @njit(fastmath={"contract"}, error_model="numpy")
+    def chains(x: np.ndarray, rounds: int) -> None:
+        scale, shift = np.float32(0.999), np.float32(0.001)
+        for _ in range(rounds):
+            for i in range(x.size):
+                a, b, c, d = x[i], x[i] + shift, x[i] - shift, x[i] * scale
+                e, f, g, h = a - scale, b - scale, c - scale, d - scale
+                for _ in range(16):
+                    a, b, c, d = a * scale + shift, b * scale + shift, c * scale + shift, d * scale + shift
+                    e, f, g, h = e * scale + shift, f * scale + shift, g * scale + shift, h * scale + shift
+                x[i] = ((a + b) + (c + d)) + ((e + f) + (g + h))
+
+    x, rounds = np.ones(1024, np.float32), 1000
+    return 2 * 8 * 16 * x.size * rounds / seconds(lambda: chains(x, rounds)) / 1e9
+
+
+@dataclass(frozen=True)
+class Grown:
+    """One step of a fit at some size, in milliseconds; layers listed for a tile; peak memory of the process."""
+
+    shapes: int
+    side: int
+    milliseconds: float
+    depth: float
+    megabytes: float
+
+
+def growth() -> Iterator[Grown]:
+    """A step by number of shapes and picture size, triangles."""
     for count in (64, 256, 1024, 4096, 8192):
         for side in (128, 256, 512, 1024):
             target = picture(side)
@@ -126,34 +185,57 @@ def growth() -> Iterator[str]:
                 spent = seconds(step(tensors, target, dense=False), least=0.3)
                 bins = fused.bins_of(tensors, side, side)
             peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024
-            depth = len(bins.layers) / (len(bins.starts) - 1)
-            yield f"| {count} | {side} | {spent * 1e3:.1f} | {depth:.1f} | {peak:.0f} |"
+            yield Grown(count, side, spent * 1e3, len(bins.layers) / (len(bins.starts) - 1), peak)
 
 
-def page() -> str:
-    """All tables. Growth is measured first, before dense torch takes memory."""
-    grown = list(growth())
+def growth_table(grown: Sequence[Grown]) -> Iterator[str]:
+    """One row for each step that was measured."""
+    yield "| shapes | size | step ms | layers a pixel | peak memory MB |"
+    yield "|---:|---:|---:|---:|---:|"
+    for g in grown:
+        yield f"| {g.shapes} | {g.side} | {g.milliseconds:.1f} | {g.depth:.1f} | {g.megabytes:.0f} |"
+
+
+def growth_chart(grown: Sequence[Grown]) -> Chart:
+    """A line for each size of the picture; dashed, what shapes × pixels would cost from the first point on."""
+    lines = {
+        f"{side} px": [(g.shapes, g.milliseconds) for g in grown if g.side == side]
+        for side in sorted({g.side for g in grown})
+    }
+    first = min((g for g in grown if g.side == 256), key=lambda g: g.shapes)
+    dense = [(g.shapes, first.milliseconds * g.shapes / first.shapes) for g in grown if g.side == first.side]
+    name = "in proportion to shapes, 256 px"
+    return Chart("One step of a fit", "shapes", "milliseconds", lines | {name: dense}, dashed=(name,))
+
+
+def page(grown: Sequence[Grown], chart: str) -> str:
+    """All tables."""
     sections = (
         "# Speed of the fused renderer",
         f"    python -m sdf2vec.bench.speed -o docs/speed.md\n\nOn {fused.available_cores()} CPU cores.",
         "## One step of a fit against the same step in dense torch\n\n256 shapes at 256 × 256, `over`: forward, "
         "L1 and SSIM, backward, Adam.",
         "\n".join(against_dense()),
-        "## Time per shape-pixel\n\nForward and backward on one core, all overhead included; a shape-pixel is a "
-        "pixel that a shape covers.",
+        "## Time per shape-pixel\n\nForward and backward of 256 shapes at 256 px on one core, all overhead included. "
+        "Extents are the boxes outside of which a shape covers nothing; of a triangle's box it covers about "
+        "two thirds. The share of the peak counts what the pixels in the extents need.",
         "\n".join(per_shape_pixel()),
         "## Growth\n\nOne step with triangles, as a fit starts with them; layers a pixel is the mean number of "
-        "layers listed for a tile.",
-        "\n".join(grown),
+        f"layers listed for a tile. Memory is that of the whole process, torch included.\n\n![Growth]({chart})",
+        "\n".join(growth_table(grown)),
     )
     return "\n\n".join(sections) + "\n"
 
 
 def main() -> None:
-    """Entry point of `python -m sdf2vec.bench.speed`."""
+    """Entry point of `python -m sdf2vec.bench.speed`. Growth is measured before dense torch takes memory."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("-o", "--output", type=Path, required=True)
-    write_atomically(parser.parse_args().output, page().encode())
+    output = parser.parse_args().output
+    picture_of_growth = output.with_suffix(".growth.svg")
+    grown = list(growth())
+    write(growth_chart(grown), picture_of_growth)
+    write_atomically(output, page(grown, picture_of_growth.name).encode())
 
 
 if __name__ == "__main__":

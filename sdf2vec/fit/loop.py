@@ -123,6 +123,7 @@ def adam(tensors: SceneTensors) -> torch.optim.Adam:
         [{"params": [tensor.requires_grad_()], "lr": 0.0, "base_rate": rates[name]} for name, tensor in free],
         betas=(0.9, 0.99),
         eps=1e-12,
+        fused=True,
     )
 
 

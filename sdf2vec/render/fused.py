@@ -86,14 +86,23 @@ def bins_of(tensors: SceneTensors, width: int, height: int) -> Bins:
     return _bin(canvas, _array(rows))
 
 
+def extents_of(tensors: SceneTensors, width: int, height: int) -> tuple[torch.Tensor, torch.Tensor]:
+    """The corners [L, 2] of the boxes outside of which the layers cover nothing, in scene units."""
+    canvas, rows = _canvas(tensors, width, height, 3)
+    bounds = [canvas.module.bounds(kind, row) for kind, row in zip(canvas.kinds, _array(rows), strict=True)]
+    boxes = torch.tensor(np.array(bounds)[:, :4])
+    return boxes[:, :2], boxes[:, 2:]
+
+
 def rows_of(groups: list[Group], pixel: float) -> torch.Tensor:
     """One row of numbers a layer, [L, widest]: `kernels.LOOK`, then `kernels.Formula.uniforms`."""
-    rows = [_group_rows(group, pixel) for group in groups]
+    rows = [group_rows(group, pixel) for group in groups]
     widest = max(row.shape[1] for row in rows)
     return torch.cat([torch.nn.functional.pad(row, (0, widest - row.shape[1])) for row in rows])
 
 
-def _group_rows(group: Group, pixel: float) -> torch.Tensor:
+def group_rows(group: Group, pixel: float) -> torch.Tensor:
+    """One row of numbers for each layer of a group."""
     shapes = torch.cat(list(group.parameters.values()), dim=2).flatten(1)  # [G, K·P], shape by shape
     pixels = torch.full_like(group.falloff, pixel)
     head = [group.colors[:, 0], *(x[:, None] for x in (group.opacity, pixels, group.falloff))]

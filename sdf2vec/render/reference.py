@@ -7,7 +7,7 @@ with gradients each chunk is recomputed in the backward pass.
 from __future__ import annotations
 
 from collections.abc import Callable
-from functools import cache
+from functools import cache, lru_cache
 
 import numpy as np
 import torch
@@ -52,9 +52,11 @@ def composite(tensors: SceneTensors, width: int, height: int) -> torch.Tensor:
     step = max(1, CHUNK // max(1, tensors.layer_count))
     chunks = list(zip(x.split(step), y.split(step), strict=True))
     if torch.is_grad_enabled() and len(chunks) > 1:
-        parts = [checkpoint(_composite, tensors, *chunk, pixel, use_reentrant=False) for chunk in chunks]
+        parts = [
+            checkpoint(composite_points, tensors, *chunk, pixel, use_reentrant=False) for chunk in chunks
+        ]
     else:
-        parts = [_composite(tensors, *chunk, pixel) for chunk in chunks]
+        parts = [composite_points(tensors, *chunk, pixel) for chunk in chunks]
     return torch.cat(parts, dim=1).reshape(4, height, width)
 
 
@@ -75,13 +77,23 @@ def canvas_axes(
 
     The canvas has width × height pixels; the axes may go on beyond its edges.
     """
-    sizes = [torch.tensor(value, dtype=torch.float64) for value in (width, height, *tensors.size)]
+    return _axes(tensors.size, columns, rows, width, height)
+
+
+@lru_cache(maxsize=8)
+def _axes(
+    size: tuple[float, float], columns: int, rows: int, width: int, height: int
+) -> tuple[np.ndarray, np.ndarray, np.float32]:
+    sizes = [torch.tensor(value, dtype=torch.float64) for value in (width, height, *size)]
     places = torch.arange(max(columns, rows), dtype=torch.float64) + 0.5
     x, y, pixel = _canvas()(places, places, *sizes)
     return x[:columns].numpy().astype(np.float32), y[:rows].numpy().astype(np.float32), np.float32(pixel)
 
 
-def _composite(tensors: SceneTensors, x: torch.Tensor, y: torch.Tensor, pixel: torch.Tensor) -> torch.Tensor:
+def composite_points(
+    tensors: SceneTensors, x: torch.Tensor, y: torch.Tensor, pixel: torch.Tensor
+) -> torch.Tensor:
+    """Premultiplied RGBA [4, P] before clamping, at points x [P], y [P], for a canvas with this size of pixel."""
     layers: dict[int, tuple[torch.Tensor, torch.Tensor, torch.Tensor]] = {}
     for group in tensors.groups:
         cover, color = group_coverage(group, x, y, pixel)

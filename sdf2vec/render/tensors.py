@@ -6,7 +6,7 @@ Layers of the same kind and number of shapes form a group, so that one lowered f
 from __future__ import annotations
 
 from collections import defaultdict
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 
 import torch
@@ -41,6 +41,12 @@ class Group:
         if self.union_size > 1:
             yield "smoothness", self.smoothness
 
+    def each(self, change: Callable[[torch.Tensor], torch.Tensor]) -> Group:
+        """A group with all tensors changed, the draw order's too: moved, or some rows taken."""
+        parameters = {name: change(values) for name, values in self.parameters.items()}
+        look = map(change, (self.colors, self.falloff, self.opacity, self.smoothness))
+        return Group(self.kind, change(self.order), parameters, *look)
+
 
 @dataclass
 class SceneTensors:
@@ -62,15 +68,7 @@ class SceneTensors:
 
 def on_device(tensors: SceneTensors, device: str) -> SceneTensors:
     """The same scene with its tensors on another device."""
-    groups = [
-        Group(
-            group.kind,
-            group.order.to(device),
-            {name: values.to(device) for name, values in group.parameters.items()},
-            *(values.to(device) for values in (group.colors, group.falloff, group.opacity, group.smoothness)),
-        )
-        for group in tensors.groups
-    ]
+    groups = [group.each(lambda tensor: tensor.to(device)) for group in tensors.groups]
     return SceneTensors(groups, tensors.background.to(device), tensors.compositing, tensors.size)
 
 

@@ -8,7 +8,6 @@ one tile. Equal input gives equal output, bit by bit: no sum depends on the orde
 from __future__ import annotations
 
 from dataclasses import dataclass
-from importlib.util import find_spec
 from itertools import pairwise
 from types import ModuleType
 from typing import Any
@@ -25,11 +24,6 @@ from .triton_kernels import SOLID
 
 SCRATCH = 1 << 29  # bytes
 WARPS = 4  # of 32 threads, for the 256 pixels of a tile; with fewer, unions run out of registers
-
-
-def available() -> bool:
-    """Whether there is a GPU that this renderer can use."""
-    return torch.cuda.is_available() and find_spec("triton") is not None
 
 
 def composite(tensors: SceneTensors, width: int, height: int, channels: int = 4) -> torch.Tensor:

@@ -1,0 +1,48 @@
+"""Line charts for the documentation, as SVG."""
+
+from __future__ import annotations
+
+import io
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import matplotlib as mpl
+from matplotlib.figure import Figure
+
+from ..files import write_atomically
+
+Points = Sequence[tuple[float, float]]
+
+
+@dataclass(frozen=True)
+class Chart:
+    """What a chart shows; both axes are logarithmic unless said otherwise. Dashed: names of lines to dash."""
+
+    title: str
+    across: str
+    up: str
+    lines: Mapping[str, Points]
+    dashed: tuple[str, ...] = ()
+    straight: bool = False  # a linear axis upwards
+
+
+def write(chart: Chart, path: Path) -> None:
+    """Writes a chart; the same numbers give the same file."""
+    figure = Figure(figsize=(7, 4.2), layout="constrained")
+    axes = figure.add_subplot()
+    for name, points in chart.lines.items():
+        style = "--" if name in chart.dashed else "-"
+        axes.plot(*zip(*points, strict=True), style, marker="o", markersize=4, label=name)
+    axes.set(title=chart.title, xlabel=chart.across, ylabel=chart.up, xscale="log")
+    axes.set_yscale("linear" if chart.straight else "log")
+    ticks = sorted({x for points in chart.lines.values() for x, _ in points})
+    if len(ticks) <= 8:
+        axes.set_xticks(ticks, [f"{tick:g}" for tick in ticks])
+        axes.minorticks_off()
+    axes.grid(alpha=0.3)
+    axes.legend(fontsize=8)
+    file = io.BytesIO()
+    with mpl.rc_context({"svg.hashsalt": "sdf2vec", "svg.fonttype": "none"}):
+        figure.savefig(file, format="svg", metadata={"Date": None, "Creator": None})
+    write_atomically(path, file.getvalue())
