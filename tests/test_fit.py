@@ -146,6 +146,12 @@ def test_pictures_are_scaled_down_only():
     assert scaled(pixels, 1000).shape == (3, 100, 400)
 
 
+def test_a_premultiplied_picture_stays_so_when_scaled():
+    """Half of the pixel is opaque, the other half is not there: half of everything is left."""
+    pixels = np.array([[[0.8, 0.4, 0.2, 1], [0, 0, 0, 0]]], dtype=np.float32)
+    assert scaled(pixels, 1)[:, 0, 0].tolist() == pytest.approx([0.4, 0.2, 0.1, 0.5], abs=1e-6)
+
+
 def test_everything_that_moves_has_a_rate():
     names = {name for group in from_scene(random_scene(layers=20)).groups for name, _ in group.tensors()}
     assert names | {"background"} == set(RATES)

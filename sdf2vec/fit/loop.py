@@ -10,7 +10,7 @@ from functools import partial
 import numpy as np
 import torch
 
-from ..image import Picture, premultiply, resize
+from ..image import Picture, premultiply, resize, unpremultiply
 from ..render.device import Device, choose
 from ..render.fused import is_compiled, threads_of_its_own
 from ..render.tensors import SceneTensors, on_device, to_scene
@@ -135,10 +135,11 @@ def _rates(phase: Phase) -> Iterator[float]:
 
 
 def scaled(pixels: np.ndarray, resolution: int) -> torch.Tensor:
-    """The picture scaled down to about resolution² pixels, [C, H, W]; never up."""
-    height, width = pixels.shape[:2]
+    """A picture, premultiplied [H, W, C], scaled down to about resolution² pixels, [C, H, W]; never up."""
+    height, width, channels = pixels.shape
     factor = min(1.0, resolution / math.sqrt(width * height))
-    small = resize(pixels, max(1, round(width * factor)), max(1, round(height * factor)))
+    size = max(1, round(width * factor)), max(1, round(height * factor))
+    small = premultiply(resize(unpremultiply(pixels), *size)) if channels == 4 else resize(pixels, *size)
     return torch.from_numpy(np.ascontiguousarray(small.transpose(2, 0, 1)))
 
 
