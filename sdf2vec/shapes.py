@@ -7,6 +7,7 @@ down, angles are in radians and turn clockwise on the screen.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Literal
@@ -109,13 +110,16 @@ class Kind:
     Euclidean distance everywhere. `slope(*parameters)` bounds how fast it changes, which is 1 for a distance.
     `extent(margin, *parameters)` is a box (low x, low y, high x, high y)
     that holds every point with distance ≤ margin, for margin ≥ 0. `outline(offset, *parameters)` is the
-    contour at `distance = offset`, where it has a simple form.
+    contour at `distance = offset`, where it has a simple form. `area(*parameters)` is what it covers when sharp,
+    and `thickness(*parameters)` its least width; both may be those of a simpler shape near it.
     """
 
     name: str
     parameters: tuple[Parameter, ...]
     distance: Callable[..., Expr]
     extent: Callable[..., Expr]
+    area: Callable[..., Expr]
+    thickness: Callable[..., Expr]
     exact: bool
     outline: Callable[..., Outline] | None = None
     slope: Callable[..., Expr] = lambda *parameters: const(1.0)
@@ -183,6 +187,14 @@ def _circle_extent(margin: Expr, center: Expr, radius: Expr) -> Expr:
     return _box_around(center, vec2(radius + margin))
 
 
+def _circle_area(center: Expr, radius: Expr) -> Expr:
+    return math.pi * radius * radius
+
+
+def _circle_thickness(center: Expr, radius: Expr) -> Expr:
+    return 2.0 * radius
+
+
 def _circle_outline(offset: float, center: Point, radius: float) -> Outline:
     return EllipseOutline(center, (radius + offset, radius + offset))
 
@@ -207,6 +219,14 @@ def _ellipse_extent(margin: Expr, center: Expr, radii: Expr, angle: Expr) -> Exp
     along, across = _axis(angle) * grown.x, _axis(angle) * grown.y
     half = vec2(length(vec2(along.x, across.y)), length(vec2(along.y, across.x)))
     return _box_around(center, half)
+
+
+def _ellipse_area(center: Expr, radii: Expr, angle: Expr) -> Expr:
+    return math.pi * radii.x * radii.y
+
+
+def _ellipse_thickness(center: Expr, radii: Expr, angle: Expr) -> Expr:
+    return 2.0 * _smaller_component(radii)
 
 
 def _ellipse_outline(offset: float, center: Point, radii: Point, angle: float) -> Outline:
@@ -235,6 +255,15 @@ def _box_extent(margin: Expr, center: Expr, half_size: Expr, angle: Expr, corner
     turned = absolute(_axis(angle))
     half = vec2(turned.x * core.x + turned.y * core.y, turned.y * core.x + turned.x * core.y)
     return _box_around(center, half + (r + margin))
+
+
+def _box_area(center: Expr, half_size: Expr, angle: Expr, corner_radius: Expr) -> Expr:
+    r = minimum(corner_radius, _smaller_component(half_size))
+    return 4.0 * half_size.x * half_size.y - (4.0 - math.pi) * r * r
+
+
+def _box_thickness(center: Expr, half_size: Expr, angle: Expr, corner_radius: Expr) -> Expr:
+    return 2.0 * _smaller_component(half_size)
 
 
 def _box_outline(
@@ -271,6 +300,16 @@ def _triangle_extent(margin: Expr, a: Expr, b: Expr, c: Expr) -> Expr:
     return vec4(low - vec2(margin), high + vec2(margin))
 
 
+def _triangle_area(a: Expr, b: Expr, c: Expr) -> Expr:
+    return 0.5 * absolute(_cross(b - a, c - a))
+
+
+def _triangle_thickness(a: Expr, b: Expr, c: Expr) -> Expr:
+    """The smallest height."""
+    longest = maximum(maximum(length(b - a), length(c - b)), length(a - c))
+    return 2.0 * _triangle_area(a, b, c) / maximum(longest, SMALLEST)
+
+
 def _triangle_outline(offset: float, a: Point, b: Point, c: Point) -> Outline:
     return PolygonOutline((a, b, c), offset)
 
@@ -293,6 +332,14 @@ def _displaced_extent(margin: Expr, center: Expr, radius: Expr, amplitude: Expr,
     return _box_around(center, vec2(radius + absolute(amplitude) + margin))
 
 
+def _displaced_area(center: Expr, radius: Expr, amplitude: Expr, frequency: Expr) -> Expr:
+    return _circle_area(center, radius)
+
+
+def _displaced_thickness(center: Expr, radius: Expr, amplitude: Expr, frequency: Expr) -> Expr:
+    return _circle_thickness(center, radius)
+
+
 def _displaced_slope(center: Expr, radius: Expr, amplitude: Expr, frequency: Expr) -> Expr:
     return 1.0 + absolute(amplitude) * length(frequency)
 
@@ -307,6 +354,8 @@ KINDS: dict[str, Kind] = {
             (_position("center"), _size("radius", 1.0)),
             _circle_distance,
             _circle_extent,
+            _circle_area,
+            _circle_thickness,
             exact=True,
             outline=_circle_outline,
         ),
@@ -315,6 +364,8 @@ KINDS: dict[str, Kind] = {
             (_position("center"), _size("radii", 1.25, 0.8), _angle("angle")),
             _ellipse_distance,
             _ellipse_extent,
+            _ellipse_area,
+            _ellipse_thickness,
             exact=False,
             outline=_ellipse_outline,
         ),
@@ -328,6 +379,8 @@ KINDS: dict[str, Kind] = {
             ),
             _box_distance,
             _box_extent,
+            _box_area,
+            _box_thickness,
             exact=True,
             outline=_box_outline,
         ),
@@ -336,6 +389,8 @@ KINDS: dict[str, Kind] = {
             (_position("a", (0.0, -1.4)), _position("b", (1.2, 0.7)), _position("c", (-1.2, 0.7))),
             sd_triangle,
             _triangle_extent,
+            _triangle_area,
+            _triangle_thickness,
             exact=True,
             outline=_triangle_outline,
         ),
@@ -349,6 +404,8 @@ KINDS: dict[str, Kind] = {
             ),
             _displaced_distance,
             _displaced_extent,
+            _displaced_area,
+            _displaced_thickness,
             exact=False,
             slope=_displaced_slope,
         ),

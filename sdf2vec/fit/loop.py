@@ -3,29 +3,44 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, field, replace
 from functools import partial
 
 import numpy as np
 import torch
 
+from ..errors import Sdf2vecError
 from ..image import Picture, premultiply, resize, unpremultiply
+from ..render import fused
 from ..render.device import Device, choose
 from ..render.fused import is_compiled, threads_of_its_own
-from ..render.tensors import SceneTensors, on_device, to_scene
-from ..scene import Scene
-from .constraints import project
+from ..render.tensors import Group, SceneTensors, from_scene, on_device, to_scene
+from ..scene import Color, Scene
+from .constraints import project, too_small, widen
+from .growth import exchange, importance, least, newcomers
 from .losses import Objective, objective
-from .placing import place
-from .presets import DEFAULT, LENGTHS, PRESETS, RATES, Loss, Phase
+from .palette import found, snap
+from .placing import Layers, background_of, empty_groups, place
+from .presets import DEFAULT, LENGTHS, PRESETS, RATES, Loss, Phase, Preset, Start
+
+WIDEN_EVERY = 10  # steps
+AREA_WEIGHT = 1.0  # of the area constraint in the loss
+TRIAL_LAYERS, TRIAL_STEPS, TRIAL_RATE = 4, 60, 0.5
+REFIT_STEPS = 100  # after the colours have been restricted
+ANYWHERE = Start("uniform")
+SAME_SHAPE = 0.01  # scene units by which a start scene's canvas may differ
 
 
 @dataclass(frozen=True)
 class Settings:
-    """What to fit and how. `kinds`: names in `shapes.KINDS`; `loss`: replaces the preset's, when given.
+    """What to fit and how.
 
-    `device`: auto, cpu, cuda or mps.
+    `kinds`: names in `shapes.KINDS`; `union`: shapes joined in each layer; `loss`: replaces the preset's, when given;
+    `least_area`: of a shape, in shares of the canvas, None leaves it to the preset; `start`: a scene to go on
+    from, at any size; `trials`: how often a few layers are tried elsewhere at the end; `palette`: the only colours
+    there may be; `colors`: how many there may be, when no palette is given, 0 for any; `weights`: how much an error matters, [H, W], of the picture's size; `device`: auto, cpu,
+    cuda or mps.
     """
 
     shapes: int = 256
@@ -35,6 +50,17 @@ class Settings:
     loss: Loss | None = None
     seed: int = 0
     device: str = "auto"
+    union: int = 1
+    least_area: float | None = None
+    start: Scene | None = None
+    trials: int = 0
+    palette: tuple[Color, ...] = ()
+    colors: int = 0
+    weights: np.ndarray | None = field(default=None, compare=False)
+
+    @property
+    def layers(self) -> Layers:
+        return Layers(self.kinds, self.compositing, self.union)
 
 
 @dataclass(frozen=True)
@@ -51,76 +77,247 @@ class Progress:
 Callback = Callable[[Progress], bool]  # returns True to stop
 
 
+class Stopped(Exception):
+    """The callback wants the fit to end."""
+
+
 def fit_picture(picture: Picture, settings: Settings, callback: Callback = lambda progress: False) -> Scene:
     """Fits shapes to a picture. The same settings give the same scene.
 
-    The callback runs after every step; when it returns True, the fit ends and what is there is returned.
+    The callback runs after every step; when it returns True, the fit ends and what is there is returned. Raises
+    Sdf2vecError where the start scene does not suit the picture or the settings.
     """
-    device = choose(settings.device)
-    generator = torch.Generator().manual_seed(settings.seed)
-    phases = [_with_loss(phase, settings.loss) for phase in PRESETS[settings.preset]]
-    pixels = premultiply(picture.pixels) if picture.has_alpha else picture.pixels
-    shortest = min(picture.width, picture.height)
-    size = (picture.width / shortest, picture.height / shortest)
-    start = scaled(pixels, phases[0].resolution)
-    tensors = place(start, size, settings.kinds, settings.shapes, settings.compositing, generator)
     with threads_of_its_own():
-        if device.name == "cpu" and not is_compiled(tensors, start.shape[0]):
-            callback(Progress("compiling kernels (once)", 0, sum(phase.steps for phase in phases), math.nan))
-        tensors = on_device(tensors, device.name)
-        optimise(tensors, pixels, phases, callback, device)
-    return to_scene(tensors, picture.width, picture.height)
+        fit = Fit(picture, settings, callback)
+        try:
+            fit.run()
+        except Stopped:
+            pass
+    return to_scene(fit.tensors, picture.width, picture.height)
 
 
-def optimise(
-    tensors: SceneTensors, pixels: np.ndarray, phases: Sequence[Phase], callback: Callback, device: Device
-) -> None:
-    """Runs the phases on a scene in place. `pixels`: premultiplied [H, W, 3 or 4]."""
-    optimizer = adam(tensors)
-    pixel = 1.0 / min(pixels.shape[:2])
-    steps = sum(phase.steps for phase in phases)
-    done = 0
-    for phase in phases:
-        target = scaled(pixels, phase.resolution).to(device.name)
-        measure = objective(phase.loss, target)
+@dataclass(frozen=True)
+class Stage:
+    """A phase at work: what it draws and how it measures that."""
+
+    phase: Phase
+    target: torch.Tensor  # [C, H, W] premultiplied
+    weights: torch.Tensor | None  # [H, W]
+    measure: Objective
+
+
+class Fit:
+    """A scene on its way to a picture."""
+
+    def __init__(self, picture: Picture, settings: Settings, callback: Callback) -> None:
+        self.settings, self.callback = settings, callback
+        self.preset = preset_of(settings)
+        self.device: Device = choose(settings.device)
+        self.generator = torch.Generator().manual_seed(settings.seed)
+        self.pixels = premultiply(picture.pixels) if picture.has_alpha else picture.pixels
+        self.pixel = 1.0 / min(picture.width, picture.height)
+        self.size = (picture.width * self.pixel, picture.height * self.pixel)
+        self.done, self.steps = 0, self._count_steps()
+        self.tensors = self._start()
+        self._announce_compiling()
+        self.tensors = on_device(self.tensors, self.device.name)
+        self.optimizer = adam(self.tensors)
+
+    @property
+    def phases(self) -> tuple[Phase, ...]:
+        """The phases of this fit; one that goes on from a scene leaves the first out."""
+        phases = self.preset.phases
+        return phases if self.settings.start is None or len(phases) == 1 else phases[1:]
+
+    def run(self) -> None:
+        """All phases, in place. Raises Stopped when the callback says so."""
+        for phase in self.phases:
+            stage = self._stage(phase)
+            for batch in range(phase.batches):
+                if phase.batches == 1:
+                    self._train(stage)
+                else:
+                    self.optimizer = adam(self.tensors)
+                    self._train(stage, partial(_in_batch, batch, phase.batches))
+        for _ in range(self.settings.trials):
+            self._try(stage)
+        if self.settings.palette or self.settings.colors:
+            self._recolor(stage)
+        widen(self.tensors, self.pixel)
+
+    def _count_steps(self) -> int:
+        steps = sum(phase.total for phase in self.phases) + self.settings.trials * TRIAL_STEPS
+        return steps + (REFIT_STEPS if self.settings.palette or self.settings.colors else 0)
+
+    def _start(self) -> SceneTensors:
+        target = scaled(self.pixels, self.phases[0].resolution)
+        settings, layers = self.settings, self.settings.layers
+        if settings.start is None:
+            count = settings.shapes // settings.union
+            return place(target, self.size, layers, count, self.preset.start, self.generator)
+        _check_start(settings.start, self.size)
+        tensors = from_scene(settings.start)
+        if tensors.transparent != (len(target) == 4):
+            tensors.background = background_of(target)
+        present = {(group.kind, group.union_size) for group in tensors.groups}
+        tensors.groups += [g for g in empty_groups(layers) if (g.kind, g.union_size) not in present]
+        self._resize(tensors, target)
+        return tensors
+
+    def _resize(self, tensors: SceneTensors, target: torch.Tensor) -> None:
+        """Brings a start scene to the number of shapes asked for."""
+        sizes = torch.cat([torch.full((len(group.order),), group.union_size) for group in tensors.groups])
+        spare = int(sizes.sum()) - self.settings.shapes
+        optimizer = adam(tensors)
+        image = fused.composite(tensors, target.shape[2], target.shape[1], len(target))
+        if spare > 0:
+            scores = importance(image, tensors, self.generator)
+            taken = sizes[torch.cat(scores).argsort(stable=True)].cumsum(0)
+            exchange(tensors, optimizer, least(scores, int((taken < spare).sum()) + 1), ())
+        elif spare < 0:
+            count = -spare // self.settings.union
+            everything = [torch.arange(len(group.order)) for group in tensors.groups]
+            fresh = newcomers(image, target, count, tensors, self.settings.layers, self.generator)
+            exchange(tensors, optimizer, everything, fresh)
+
+    def _announce_compiling(self) -> None:
+        if self.device.name == "cpu" and not is_compiled(self.tensors, self.pixels.shape[2]):
+            self.callback(Progress("compiling kernels (once)", 0, self.steps, math.nan))
+
+    def _stage(self, phase: Phase) -> Stage:
+        target = scaled(self.pixels, phase.resolution).to(self.device.name)
+        weights = None
+        if self.settings.weights is not None:
+            small = scaled(self.settings.weights[..., None], phase.resolution)[0].to(self.device.name)
+            weights = small / small.mean()
+        return Stage(phase, target, weights, objective(phase.loss, target, weights))
+
+    def _draw(self, tensors: SceneTensors, target: torch.Tensor) -> torch.Tensor:
         channels, height, width = target.shape
-        draw = partial(device.composite, tensors, width, height, channels)
-        for rate in _rates(phase):
-            loss = _step(draw, measure, optimizer, rate)
-            project(tensors, pixel)
-            done += 1
-            if callback(Progress(phase.name, done, steps, loss, device.name)):
-                return
+        return self.device.composite(tensors, width, height, channels)
+
+    def _train(self, stage: Stage, moves: Callable[[Group], torch.Tensor] | None = None) -> None:
+        """The steps of a phase; `moves` tells which layers of a group are trained, all without it."""
+        phase = stage.phase
+        for step, rate in enumerate(_rates(phase)):
+            if phase.relocation is not None and phase.relocation.is_due(step, phase.steps):
+                self._relocate(stage, phase.relocation.share)
+            loss = self._step(stage, rate, moves)
+            self.done += 1
+            if self.callback(Progress(phase.name, self.done, self.steps, loss, self.device.name)):
+                raise Stopped
+
+    def _step(self, stage: Stage, rate: float, moves: Callable[[Group], torch.Tensor] | None) -> float:
+        self.optimizer.zero_grad(set_to_none=True)
+        value = stage.measure(self._draw(self.tensors, stage.target))
+        if self.preset.least_area > 0:
+            least_area = self.preset.least_area * self.size[0] * self.size[1]
+            value = value + AREA_WEIGHT * too_small(self.tensors, least_area)
+        value.backward()
+        if moves is not None:
+            _freeze(self.tensors, moves)
+        for group in self.optimizer.param_groups:
+            group["lr"] = group["base_rate"] * rate
+        self.optimizer.step()
+        project(self.tensors, self.pixel, self.preset.falloff)
+        if self.done % WIDEN_EVERY == 0:
+            widen(self.tensors, self.pixel)
+        return float(value.detach())
+
+    def _try(self, stage: Stage) -> None:
+        """Starts a few layers anew, anywhere, trains them alone, and takes that back unless the loss falls."""
+        before = [group.each(lambda tensor: tensor.detach().clone()) for group in self.tensors.groups]
+        image = self._draw(self.tensors, stage.target)
+        loss = float(stage.measure(image).detach())
+        count = min(TRIAL_LAYERS, self.tensors.layer_count)
+        scores = importance(image, self.tensors, self.generator)
+        places = place(stage.target.cpu(), self.size, self.settings.layers, count, ANYWHERE, self.generator)
+        for group in places.groups:
+            group.order += self.tensors.layer_count
+        exchange(self.tensors, self.optimizer, least(scores, count), places.groups)
+        first = self.tensors.layer_count - count
+        phase = Phase("trial", TRIAL_STEPS, stage.phase.resolution, rate=TRIAL_RATE, end_rate=0.05)
+        self.optimizer = adam(self.tensors)
+        self._train(replace(stage, phase=phase), lambda group: group.order >= first)
+        with torch.no_grad():
+            worse = float(stage.measure(self._draw(self.tensors, stage.target))) >= loss
+        if worse:
+            self.tensors.groups = before
+        self.optimizer = adam(self.tensors)
+
+    def _recolor(self, stage: Stage) -> None:
+        """Restricts the colours, and fits the rest again."""
+        cover = importance(self._draw(self.tensors, stage.target), self.tensors, self.generator)
+        palette = self.settings.palette or found(self.tensors, cover, self.settings.colors, self.generator)
+        snap(self.tensors, list(palette))
+        self.optimizer = adam(self.tensors, frozen=("color", "background"))
+        phase = Phase("palette", REFIT_STEPS, stage.phase.resolution, rate=0.4, end_rate=0.02)
+        self._train(replace(stage, phase=phase))
+
+    def _relocate(self, stage: Stage, share: float) -> None:
+        count = round(share * self.tensors.layer_count)
+        if count == 0:
+            return
+        image = self._draw(self.tensors, stage.target)
+        scores = importance(image, self.tensors, self.generator)
+        layers = self.settings.layers
+        fresh = newcomers(image, stage.target, count, self.tensors, layers, self.generator, stage.weights)
+        exchange(self.tensors, self.optimizer, least(scores, count), fresh)
 
 
-def _step(
-    draw: Callable[[], torch.Tensor], measure: Objective, optimizer: torch.optim.Optimizer, rate: float
-) -> float:
-    optimizer.zero_grad(set_to_none=True)
-    value = measure(draw())
-    value.backward()
-    for group in optimizer.param_groups:
-        group["lr"] = group["base_rate"] * rate
-    optimizer.step()
-    return float(value.detach())
+def preset_of(settings: Settings) -> Preset:
+    """The preset with what the settings replace. Raises Sdf2vecError where it is for another compositing."""
+    preset = PRESETS[settings.preset]
+    if preset.compositing not in (None, settings.compositing):
+        raise Sdf2vecError(f"the preset {settings.preset} is for --compositing {preset.compositing}")
+    if settings.loss is not None:
+        preset = replace(preset, phases=tuple(replace(p, loss=settings.loss) for p in preset.phases))
+    if settings.least_area is not None:
+        preset = replace(preset, least_area=settings.least_area)
+    return preset
 
 
-def adam(tensors: SceneTensors) -> torch.optim.Adam:
-    """Adam over all that may move, each tensor at the rate of what it means."""
-    groups = [(name, tensor) for group in tensors.groups for name, tensor in group.tensors()]
-    if tensors.transparent:
-        free = groups
-    else:
-        free = [
-            (name, tensor) for name, tensor in groups if name != "opacity" or tensors.compositing == "over"
-        ]
+def _check_start(scene: Scene, size: tuple[float, float]) -> None:
+    if max(abs(a - b) for a, b in zip(scene.extent, size, strict=True)) > SAME_SHAPE:
+        wide, high = (f"{side:.3g}" for side in scene.extent)
+        raise Sdf2vecError(
+            f"the start scene has another shape than the picture: {wide} to {high}, not {size[0]:.3g} to {size[1]:.3g}"
+        )
+
+
+def _in_batch(batch: int, batches: int, group: Group) -> torch.Tensor:
+    """Which layers of a group are in a batch: every so many-th of the draw order."""
+    return group.order % batches == batch
+
+
+def _freeze(tensors: SceneTensors, moves: Callable[[Group], torch.Tensor]) -> None:
+    """Leaves the layers that may not move, and the background, without a derivative."""
+    for group in tensors.groups:
+        still = ~moves(group)
+        for _, tensor in group.tensors():
+            if tensor.grad is not None:
+                tensor.grad[still] = 0.0
+    if tensors.background.grad is not None:
+        tensors.background.grad.zero_()
+
+
+def adam(tensors: SceneTensors, frozen: tuple[str, ...] = ()) -> torch.optim.Adam:
+    """Adam over all that may move, each tensor at the rate of what it means; `frozen`: names in `RATES`."""
+    free = [pair for group in tensors.groups for pair in group.tensors()]
+    if not tensors.transparent:
         free.append(("background", tensors.background))
+        if tensors.compositing == "additive":
+            frozen = (*frozen, "opacity")
     scale = math.sqrt(tensors.size[0] * tensors.size[1])  # of the canvas, and so of what lies on it
     rates = (
         RATES | {name: RATES[name] * scale for name in LENGTHS} | {"frequency": RATES["frequency"] / scale}
     )
     return torch.optim.Adam(
-        [{"params": [tensor.requires_grad_()], "lr": 0.0, "base_rate": rates[name]} for name, tensor in free],
+        [
+            {"params": [tensor.detach_().requires_grad_()], "lr": 0.0, "base_rate": rates[name]}
+            for name, tensor in free
+            if name not in frozen
+        ],
         betas=(0.9, 0.99),
         eps=1e-12,
         fused=True,
@@ -134,14 +331,13 @@ def _rates(phase: Phase) -> Iterator[float]:
         yield phase.rate + (phase.end_rate - phase.rate) * fall
 
 
-def scaled(pixels: np.ndarray, resolution: int) -> torch.Tensor:
-    """A picture, premultiplied [H, W, C], scaled down to about resolution² pixels, [C, H, W]; never up."""
+def scaled(pixels: np.ndarray, resolution: float) -> torch.Tensor:
+    """A picture, premultiplied [H, W, C], scaled down to about resolution² pixels, [C, H, W]; never up.
+
+    A resolution up to 1 is a share of the picture's own.
+    """
     height, width, channels = pixels.shape
-    factor = min(1.0, resolution / math.sqrt(width * height))
+    factor = resolution if resolution <= 1 else min(1.0, resolution / math.sqrt(width * height))
     size = max(1, round(width * factor)), max(1, round(height * factor))
     small = premultiply(resize(unpremultiply(pixels), *size)) if channels == 4 else resize(pixels, *size)
     return torch.from_numpy(np.ascontiguousarray(small.transpose(2, 0, 1)))
-
-
-def _with_loss(phase: Phase, loss: Loss | None) -> Phase:
-    return replace(phase, loss=loss) if loss else phase

@@ -1,49 +1,97 @@
-"""Where the shapes of a fit start: denser and smaller where the picture has detail."""
+"""Where the shapes of a fit start: denser and smaller where the picture has detail, or anywhere."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
+from dataclasses import dataclass
 
 import torch
 
 from ..render.tensors import Group, SceneTensors
-from ..shapes import KINDS, Kind
+from ..shapes import KINDS, Parameter
+from .presets import Start
 
 UNIFORM_SHARE = 0.35  # of the shapes goes anywhere, the rest where the picture changes
 CANDIDATES = 8  # positions tried for each shape; the one farthest from the others, in their sizes, is taken
 FALLOFF = 0.4  # of a shape's size
 LARGEST = 0.35  # size of a shape, for a canvas of area 1
+OPACITY = 0.8  # under `over`, of an opaque picture
+SMOOTHNESS = 0.25  # of a smooth union, of the size of its layer
+
+
+@dataclass(frozen=True)
+class Layers:
+    """What new layers are made of: any of these kinds, so many shapes joined in each, under this compositing."""
+
+    kinds: tuple[str, ...]
+    compositing: str
+    union: int = 1
+
+
+@dataclass(frozen=True)
+class Places:
+    """Where and how large layers start: centres [N, 2] and sizes [N] in scene units, straight RGBA [N, 4]."""
+
+    centers: torch.Tensor
+    sizes: torch.Tensor
+    colors: torch.Tensor
+
+    def __len__(self) -> int:
+        return len(self.sizes)
+
+    def rows(self, index: torch.Tensor) -> Places:
+        """Some of them."""
+        return Places(self.centers[index], self.sizes[index], self.colors[index])
 
 
 def place(
     target: torch.Tensor,
     size: tuple[float, float],
-    kinds: Sequence[str],
+    layers: Layers,
     count: int,
-    compositing: str,
+    start: Start,
     generator: torch.Generator,
 ) -> SceneTensors:
-    """Start values for `count` shapes.
+    """Start values for `count` layers.
 
     `target` is premultiplied, [3 or 4, H, W]; `size` is the canvas in scene units. Large shapes come first in
     the draw order.
     """
-    centers, sizes = _spread(detail(target), size, count, generator)
+    density = (
+        detail(target) if start.spread == "detail" else torch.full(target.shape[1:], 1 / target[0].numel())
+    )
+    centers, sizes = _spread(density, size, count, generator)
     order = sizes.argsort(descending=True, stable=True)
     centers, sizes = centers[order], sizes[order]
-    background = _background(target)
-    colors = _colors(target, centers, size)
-    assigned = torch.randint(len(kinds), (count,), generator=generator)
-    groups = [
-        _group(KINDS[kind], rows, centers[rows], sizes[rows], colors[:, rows], compositing, generator)
-        for index, kind in enumerate(kinds)
-        if len(rows := (assigned == index).nonzero()[:, 0])
-    ]
-    if compositing == "additive":
+    background = background_of(target)
+    colors = colors_at(target, centers, size)
+    if layers.compositing == "additive":
+        colors[:, :3] = 0.3 * (colors[:, :3] - background[:3]) if start.colors == "picture" else 0.0
+    groups = groups_at(Places(centers, sizes, colors), layers, generator)
+    if start.falloff is not None:
         for group in groups:
-            group.colors = 0.3 * (group.colors - background[:3])
-    return SceneTensors(groups, background, compositing, size)
+            group.falloff.fill_(start.falloff)
+    return SceneTensors(groups, background, layers.compositing, size)
+
+
+def groups_at(places: Places, layers: Layers, generator: torch.Generator, first: int = 0) -> list[Group]:
+    """New layers at these places, one group for each kind; their draw order begins with `first`.
+
+    Several kinds are dealt out at random.
+    """
+    dealt = torch.randint(len(layers.kinds), (len(places),), generator=generator)
+    return [
+        _group(kind, first + rows, places.rows(rows), layers, generator)
+        for index, kind in enumerate(layers.kinds)
+        for rows in [(dealt == index).nonzero()[:, 0]]
+    ]
+
+
+def empty_groups(layers: Layers) -> list[Group]:
+    """A group without layers for each kind."""
+    nowhere = Places(torch.zeros(0, 2), torch.zeros(0), torch.zeros(0, 4))
+    return groups_at(nowhere, layers, torch.Generator())
 
 
 def detail(target: torch.Tensor) -> torch.Tensor:
@@ -82,59 +130,61 @@ def _spread(
     return centers, sizes
 
 
-def _background(target: torch.Tensor) -> torch.Tensor:
+def background_of(target: torch.Tensor) -> torch.Tensor:
+    """The mean colour of an opaque picture, nothing for one with alpha; premultiplied RGBA."""
     if len(target) == 4:
         return torch.zeros(4)
     return torch.cat([target.mean(dim=(1, 2)), torch.ones(1)])
 
 
-def _colors(target: torch.Tensor, centers: torch.Tensor, size: tuple[float, float]) -> torch.Tensor:
-    """RGB and alpha of the picture at the centres, straight, [4, N]."""
+def colors_at(target: torch.Tensor, centers: torch.Tensor, size: tuple[float, float]) -> torch.Tensor:
+    """Straight RGBA of a premultiplied picture [C, H, W] at points [N, 2] in scene units, [N, 4]."""
     height, width = target.shape[1:]
     column = ((centers[:, 0] / size[0] + 0.5) * width).long().clamp(0, width - 1)
     row = ((centers[:, 1] / size[1] + 0.5) * height).long().clamp(0, height - 1)
-    found = target[:, row, column]
-    alpha = found[3] if len(found) == 4 else torch.ones(len(centers))
-    return torch.cat([found[:3] / alpha.clamp(min=1e-3), alpha[None]]).clamp(0.0, 1.0)
+    return straight(target[:, row, column].T)
+
+
+def straight(premultiplied: torch.Tensor) -> torch.Tensor:
+    """Straight RGBA [N, 4] of premultiplied RGB or RGBA [N, 3 or 4]."""
+    if premultiplied.shape[1] == 3:
+        return torch.cat([premultiplied, torch.ones(len(premultiplied), 1)], dim=1).clamp(0.0, 1.0)
+    alpha = premultiplied[:, 3:]
+    return torch.cat([premultiplied[:, :3] / alpha.clamp(min=1e-3), alpha], dim=1).clamp(0.0, 1.0)
 
 
 def _group(
-    kind: Kind,
-    order: torch.Tensor,
-    centers: torch.Tensor,
-    sizes: torch.Tensor,
-    colors: torch.Tensor,
-    compositing: str,
-    generator: torch.Generator,
+    kind: str, order: torch.Tensor, places: Places, layers: Layers, generator: torch.Generator
 ) -> Group:
-    turns = torch.rand(len(order), generator=generator) * 2 * math.pi
-    parameters = {
-        parameter.name: _START[parameter.unit](torch.tensor(parameter.start), centers, sizes, turns)[:, None]
-        for parameter in kind.parameters
-    }
-    opacity = colors[3] * 0.8 if compositing == "over" else colors[3]
+    """Layers of one kind; the shapes of a union lie around its centre, each smaller than the whole."""
+    turns = torch.rand((len(places), layers.union), generator=generator) * 2 * math.pi
+    around = 2 * math.pi * torch.arange(layers.union) / layers.union + turns[:, :1]
+    away = 0.0 if layers.union == 1 else 0.6 * places.sizes[:, None]
+    centers = places.centers[:, None] + torch.stack([around.cos() * away, around.sin() * away], dim=2)
+    sizes = (places.sizes / math.sqrt(layers.union))[:, None].expand(-1, layers.union)
     return Group(
-        kind.name,
+        kind,
         order,
-        parameters,
-        colors[:3].T[:, None].clone(),
-        sizes * FALLOFF,
-        opacity,
-        torch.zeros(len(order)),
+        {p.name: _START[p.unit](p, centers, sizes, turns) for p in KINDS[kind].parameters},
+        places.colors[:, None, :3].repeat(1, layers.union, 1),
+        places.sizes * FALLOFF,
+        places.colors[:, 3] * (OPACITY if layers.compositing == "over" else 1.0),
+        places.sizes * (SMOOTHNESS if layers.union > 1 else 0.0),
     )
 
 
 def _start_position(
-    start: torch.Tensor, centers: torch.Tensor, sizes: torch.Tensor, turns: torch.Tensor
+    parameter: Parameter, centers: torch.Tensor, sizes: torch.Tensor, turns: torch.Tensor
 ) -> torch.Tensor:
+    x, y = parameter.start
     cosine, sine = turns.cos(), turns.sin()
-    offset = torch.stack([cosine * start[0] - sine * start[1], sine * start[0] + cosine * start[1]], dim=1)
-    return centers + offset * sizes[:, None]
+    return centers + torch.stack([cosine * x - sine * y, sine * x + cosine * y], dim=2) * sizes[..., None]
 
 
-_START: dict[str, Callable[[torch.Tensor, torch.Tensor, torch.Tensor, torch.Tensor], torch.Tensor]] = {
+# by unit: a parameter's values [N, K, P] for shapes at centres [N, K, 2], of sizes and turns [N, K]
+_START: dict[str, Callable[[Parameter, torch.Tensor, torch.Tensor, torch.Tensor], torch.Tensor]] = {
     "position": _start_position,
-    "length": lambda start, centers, sizes, turns: start * sizes[:, None],
-    "angle": lambda start, centers, sizes, turns: start + turns[:, None],
-    "frequency": lambda start, centers, sizes, turns: start / sizes[:, None],
+    "length": lambda p, centers, sizes, turns: torch.tensor(p.start) * sizes[..., None],
+    "angle": lambda p, centers, sizes, turns: torch.tensor(p.start) + turns[..., None],
+    "frequency": lambda p, centers, sizes, turns: torch.tensor(p.start) / sizes[..., None],
 }

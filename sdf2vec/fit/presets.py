@@ -1,57 +1,133 @@
-"""What happens in a fit, as data: a preset is a tuple of phases."""
+"""What happens in a fit, as data: a preset says how shapes start and which phases follow."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Literal
 
 Loss = tuple[tuple[str, float], ...]  # name in `losses.LOSSES`, weight
 
-L1_SSIM: Loss = (("l1", 0.8), ("ssim", 0.2))
+L1: Loss = (("l1", 1.0),)
+MSE: Loss = (("mse", 1.0),)
+
+
+@dataclass(frozen=True)
+class Relocation:
+    """Every so many steps a share of the layers, those that matter least, moves to where most is missing.
+
+    `until`: the share of the phase after which everything stays.
+    """
+
+    every: int
+    share: float
+    until: float = 0.8
+
+    def is_due(self, step: int, steps: int) -> bool:
+        """Whether it happens before this step of so many."""
+        return step % self.every == self.every // 2 and step < steps * self.until
 
 
 @dataclass(frozen=True)
 class Phase:
     """A stretch of the fit at one resolution.
 
-    `resolution`: the picture is scaled down to about this many pixels squared. `rate` and `end_rate` scale all
-    learning rates at the start and at the end, along half a cosine.
+    `resolution`: the picture is scaled down to about this many pixels squared; up to 1, to this share of its
+    sides. `rate` and `end_rate` scale all learning rates at the start and at the end, along half a cosine. With
+    `batches`, the layers are trained in so many parts, one after the other, each for all steps, the others frozen.
     """
 
     name: str
     steps: int
-    resolution: int
+    resolution: float
     rate: float = 1.0
     end_rate: float = 1.0
-    loss: Loss = L1_SSIM
+    loss: Loss = L1
+    relocation: Relocation | None = None
+    batches: int = 1
+
+    @property
+    def total(self) -> int:
+        """Steps of all batches."""
+        return self.steps * self.batches
 
 
-PRESETS: dict[str, tuple[Phase, ...]] = {
-    "fast": (
-        Phase("coarse", 120, 48),
-        Phase("fine", 100, 112, rate=0.8, end_rate=0.05),
+@dataclass(frozen=True)
+class Start:
+    """How shapes start: where the picture has detail, or anywhere; in its colours, or in black (under additive).
+
+    `falloff`: in scene units, or None for a share of each shape's size.
+    """
+
+    spread: Literal["detail", "uniform"] = "detail"
+    colors: Literal["picture", "zero"] = "picture"
+    falloff: float | None = None
+
+
+@dataclass(frozen=True)
+class Preset:
+    """A whole fit. `compositing`: the only one that it is for; `falloff`: its range in scene units;
+    `least_area`: of a shape, in shares of the canvas; smaller ones are pushed to grow.
+    """
+
+    phases: tuple[Phase, ...]
+    start: Start = Start()
+    compositing: str | None = None
+    falloff: tuple[float, float] = (0.0, 1.5)
+    least_area: float = 0.0
+
+    @property
+    def steps(self) -> int:
+        """Steps of all phases."""
+        return sum(phase.total for phase in self.phases)
+
+
+OFTEN = Relocation(every=20, share=0.05)
+
+PRESETS: dict[str, Preset] = {
+    "fast": Preset(
+        (
+            Phase("coarse", 150, 64, loss=MSE, relocation=OFTEN),
+            Phase("fine", 100, 128, rate=0.8, end_rate=0.03),
+        )
     ),
-    "balanced": (
-        Phase("coarse", 300, 64),
-        Phase("middle", 250, 128, rate=0.8, end_rate=0.4),
-        Phase("fine", 150, 256, rate=0.4, end_rate=0.02),
+    "balanced": Preset(
+        (
+            Phase("coarse", 300, 96, relocation=OFTEN),
+            Phase("middle", 250, 128, rate=0.8, end_rate=0.4, relocation=OFTEN),
+            Phase("fine", 150, 256, rate=0.4, end_rate=0.02),
+        )
     ),
-    "best": (
-        Phase("coarse", 600, 64),
-        Phase("middle", 700, 160, rate=0.8, end_rate=0.4),
-        Phase("fine", 500, 320, rate=0.4, end_rate=0.01),
+    "best": Preset(
+        (
+            Phase("coarse", 600, 96, relocation=OFTEN),
+            Phase("middle", 700, 192, rate=0.8, end_rate=0.4, relocation=OFTEN),
+            Phase("fine", 500, 384, rate=0.4, end_rate=0.01),
+        )
+    ),
+    # Of the thesis. It leaves open: where shapes start (anywhere), the size of a batch (a quarter of the layers), the
+    # least area of its constraint (that of a disc of a hundredth of the canvas' side), and Adam's rates (ours).
+    "thesis": Preset(
+        (
+            Phase("global", 600, 128, loss=MSE),
+            Phase("batches", 200, 0.5, rate=0.5, end_rate=0.05, loss=MSE, batches=4),
+        ),
+        Start("uniform", "zero", 0.5),
+        compositing="additive",
+        falloff=(0.01, 0.99),
+        least_area=3e-4,
     ),
 }
 DEFAULT = "balanced"
 
 # Learning rates per step on a canvas of area 1, by what a tensor means (units as in `shapes.Parameter`).
 RATES = {
-    "position": 0.005,
+    "position": 0.01,
     "length": 0.003,
     "angle": 0.03,
     "frequency": 0.3,
     "color": 0.02,
-    "opacity": 0.02,
-    "falloff": 0.003,
+    "opacity": 0.015,
+    "falloff": 0.01,
     "smoothness": 0.003,
     "background": 0.01,
 }

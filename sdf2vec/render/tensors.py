@@ -47,6 +47,13 @@ class Group:
         look = map(change, (self.colors, self.falloff, self.opacity, self.smoothness))
         return Group(self.kind, change(self.order), parameters, *look)
 
+    def joined(self, other: Group) -> Group:
+        """The rows of both, this group's first."""
+        parameters = {name: torch.cat([a, other.parameters[name]]) for name, a in self.parameters.items()}
+        looks = [(g.order, g.colors, g.falloff, g.opacity, g.smoothness) for g in (self, other)]
+        order, *look = (torch.cat(pair) for pair in zip(*looks, strict=True))
+        return Group(self.kind, order, parameters, *look)
+
 
 @dataclass
 class SceneTensors:

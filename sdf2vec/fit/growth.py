@@ -1,0 +1,135 @@
+"""Which layers leave and which come: those that matter least go, new ones start where most is missing.
+
+What is decided is pure; `exchange` alone changes a scene, and Adam's state with it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import torch
+
+from ..render.tensors import Group, SceneTensors
+from .placing import Layers, Places, groups_at, straight
+from .pursuit import find_places
+
+PROBES = 8  # random images that estimate what a layer does to the picture
+ROOM = 1.2  # size of a new shape, in radii of the disc whose place it takes
+
+
+def importance(image: torch.Tensor, tensors: SceneTensors, generator: torch.Generator) -> list[torch.Tensor]:
+    """How much the image changes, squared and summed, when a layer is left out: [G] for each group; an estimate.
+
+    The image [C, H, W], before clamping, depends linearly on a layer's opacity (under `additive`, on its colours),
+    so that its derivative times that is the change; random signs r give E[(Σ r·change)²] = Σ change² (Hutchinson).
+    """
+    leaves = [g.colors if tensors.compositing == "additive" else g.opacity for g in tensors.groups]
+    totals = [torch.zeros(len(group.order)) for group in tensors.groups]
+    for _ in range(PROBES):
+        signs = torch.randint(0, 2, image.shape, generator=generator).float() * 2 - 1
+        grads = torch.autograd.grad(image, leaves, signs.to(image.device), retain_graph=True)
+        for total, leaf, grad in zip(totals, leaves, grads, strict=True):
+            total += (
+                (leaf.detach() * grad)
+                .flatten(1 if leaf.dim() > 1 else 0)
+                .reshape(len(leaf), -1)
+                .sum(1)
+                .square()
+                .cpu()
+            )
+    return totals
+
+
+def least(scores: Sequence[torch.Tensor], count: int) -> list[torch.Tensor]:
+    """For each group, the rows that stay when the `count` layers with the lowest scores go."""
+    flat = torch.cat(list(scores))
+    stays = torch.ones(len(flat), dtype=torch.bool)
+    stays[flat.argsort(stable=True)[:count]] = False
+    parts = stays.split([len(score) for score in scores])
+    return [part.nonzero()[:, 0] for part in parts]
+
+
+def newcomers(
+    image: torch.Tensor,
+    target: torch.Tensor,
+    count: int,
+    tensors: SceneTensors,
+    layers: Layers,
+    generator: torch.Generator,
+    weights: torch.Tensor | None = None,
+) -> list[Group]:
+    """New layers on top of all others, where they take most of what is missing from an image [C, H, W] away.
+
+    `weights` [H, W]: how much an error matters.
+    """
+    image, target = image.detach().cpu(), target.cpu()
+    residual = target - image if weights is None else (target - image) * weights.cpu().sqrt()
+    found = find_places(residual, count)
+    height, width = target.shape[1:]
+    centers = (found.centers / torch.tensor([width, height]) - 0.5) * torch.tensor(tensors.size)
+    sizes = found.radii * ROOM * (tensors.size[0] / width)
+    column, row = found.centers.long().unbind(1)
+    if tensors.compositing == "additive":
+        amounts = torch.nn.functional.pad(found.amounts, (0, 4 - found.amounts.shape[1]))
+        colors = amounts.clamp(-1.0, 1.0)
+    else:
+        colors = straight(image[:, row, column].T + found.amounts)
+    return groups_at(Places(centers, sizes, colors), layers, generator, first=tensors.layer_count)
+
+
+def exchange(
+    tensors: SceneTensors,
+    optimizer: torch.optim.Optimizer,
+    stays: Sequence[torch.Tensor],
+    fresh: Sequence[Group],
+) -> None:
+    """Keeps some rows of each group and adds new ones behind them, in the scene and in the optimizer's state.
+
+    New layers' state is 0. The draw order is counted anew; a group that loses all rows remains, empty.
+    """
+    for index, rows in enumerate(stays):
+        old = tensors.groups[index]
+        new = next((group for group in fresh if _same(group, old)), None)
+        kept = old.each(lambda tensor, rows=rows: tensor.detach()[rows.to(tensor.device)])  # type: ignore[misc]
+        joined = (
+            kept
+            if new is None
+            else kept.joined(new.each(lambda tensor, old=old: tensor.to(old.order.device)))
+        )  # type: ignore[misc]
+        tensors.groups[index] = joined
+        for (_, before), (_, after) in zip(old.tensors(), joined.tensors(), strict=True):
+            _replace(optimizer, before, after, rows)
+    tensors.groups += [new for new in fresh if not any(_same(new, old) for old in tensors.groups)]
+    _renumber(tensors.groups)
+
+
+def _same(a: Group, b: Group) -> bool:
+    return (a.kind, a.union_size) == (b.kind, b.union_size)
+
+
+def _replace(
+    optimizer: torch.optim.Optimizer, before: torch.Tensor, after: torch.Tensor, rows: torch.Tensor
+) -> None:
+    """Puts a tensor in another's place; rows beyond the kept ones have no history."""
+    for group in optimizer.param_groups:
+        if group["params"][0] is before:
+            group["params"] = [after.requires_grad_()]
+            if state := optimizer.state.pop(before, None):
+                optimizer.state[after] = {name: _kept(value, after, rows) for name, value in state.items()}
+
+
+def _kept(value: torch.Tensor, after: torch.Tensor, rows: torch.Tensor) -> torch.Tensor:
+    if value.dim() == 0:
+        return value  # how many steps there have been
+    history = torch.zeros_like(after)
+    history[: len(rows)] = value[rows.to(value.device)]
+    return history.detach()
+
+
+def _renumber(groups: Sequence[Group]) -> None:
+    """Draw orders become 0, 1, 2, … without gaps."""
+    orders = torch.cat([group.order for group in groups])
+    ranks = torch.empty_like(orders)
+    ranks[orders.argsort(stable=True)] = torch.arange(len(orders), device=orders.device)
+    for group, order in zip(groups, ranks.split([len(g.order) for g in groups]), strict=True):
+        group.order = order

@@ -1,0 +1,68 @@
+"""Few colours: a given palette, or the best few for a scene, by distance in CIELAB."""
+
+from __future__ import annotations
+
+import numpy as np
+import torch
+from numpy.typing import NDArray
+from scipy.cluster.vq import kmeans2
+from skimage.color import lab2rgb, rgb2lab
+
+from ..render.tensors import SceneTensors
+
+SAMPLES = 4096  # colours drawn in proportion to what they cover
+ROUNDS = 50  # of k-means
+DECIMALS = 3  # of a found colour: 8 bits hold no more
+
+
+def found(
+    tensors: SceneTensors, cover: list[torch.Tensor], count: int, generator: torch.Generator
+) -> list[tuple[float, float, float]]:
+    """At most `count` colours that stand for the scene's best: k-means, each weighted by what it covers ([G])."""
+    colors, weights = _colors(tensors), _weights(tensors, cover)
+    picked = torch.multinomial(weights, SAMPLES, replacement=True, generator=generator)
+    lab = _lab(colors[picked])
+    count = min(count, len(np.unique(lab, axis=0)))
+    seed = int(torch.randint(2**31, (1,), generator=generator))
+    centers, _ = kmeans2(lab, count, iter=ROUNDS, minit="++", seed=seed, missing="warn")
+    rgb = np.clip(lab2rgb(centers[None])[0], 0.0, 1.0).round(DECIMALS)
+    return [tuple(color) for color in rgb.tolist()]
+
+
+@torch.no_grad()
+def snap(tensors: SceneTensors, palette: list[tuple[float, float, float]]) -> None:
+    """Replaces every colour, the background's too, by the nearest of the palette, in place."""
+    choices = torch.tensor(palette)
+    for group in tensors.groups:
+        flat = group.colors.reshape(-1, 3)
+        group.colors.copy_(_nearest(flat.cpu(), choices).to(flat.device).reshape(group.colors.shape))
+    if not tensors.transparent:
+        tensors.background[:3] = _nearest(tensors.background[None, :3].cpu(), choices)[0]
+
+
+def _nearest(colors: torch.Tensor, choices: torch.Tensor) -> torch.Tensor:
+    if len(colors) == 0:
+        return colors
+    distances = torch.cdist(torch.from_numpy(_lab(colors)), torch.from_numpy(_lab(choices)))
+    return choices[distances.argmin(dim=1)]
+
+
+def _colors(tensors: SceneTensors) -> torch.Tensor:
+    """All colours of a scene, [M, 3]; the background's last, unless it is transparent."""
+    colors = [group.colors.detach().cpu().reshape(-1, 3) for group in tensors.groups]
+    ground = [] if tensors.transparent else [tensors.background.detach()[None, :3].cpu()]
+    return torch.cat([*colors, *ground]).clamp(0.0, 1.0)
+
+
+def _weights(tensors: SceneTensors, cover: list[torch.Tensor]) -> torch.Tensor:
+    """A weight for each of `_colors`; the background counts as the mean of the layers together."""
+    parts = [
+        score.repeat_interleave(group.union_size) for score, group in zip(cover, tensors.groups, strict=True)
+    ]
+    weights = torch.cat(parts) + 1e-9
+    return weights if tensors.transparent else torch.cat([weights, weights.mean()[None] * len(weights) * 0.1])
+
+
+def _lab(colors: torch.Tensor) -> NDArray[np.float64]:
+    lab: NDArray[np.float64] = rgb2lab(colors.double().numpy()[None])[0]
+    return lab

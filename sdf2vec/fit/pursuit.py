@@ -1,0 +1,89 @@
+"""Where shapes would help most: matching pursuit with soft discs on what is missing of a picture."""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import torch
+
+ROUNDS = 16  # the residual is looked at anew so many times
+SCALE = 1.4  # from one size of disc to the next
+SMALLEST, LARGEST = 0.8, 0.3  # radius of a disc: pixels; shares of the square root of the picture's area
+WIDTH = 0.6  # standard deviation of the Gaussian that stands for a disc of radius 1
+APART = 1.5  # radii around a disc where none is put in the same round
+
+
+class Places(NamedTuple):
+    """Discs by position in pixels [N, 2], radius in pixels [N], and what each adds [N, C]."""
+
+    centers: torch.Tensor
+    radii: torch.Tensor
+    amounts: torch.Tensor
+
+
+def find_places(residual: torch.Tensor, count: int) -> Places:
+    """The discs that take most of a residual [C, H, W] away, squared; greedy (Mallat and Zhang 1993)."""
+    height, width = residual.shape[1:]
+    radii = _radii(height, width)
+    left, found = residual.clone(), []
+    remaining = count
+    for rounds_left in range(ROUNDS, 0, -1):
+        now = math.ceil(remaining / rounds_left)
+        amounts, gains = _responses(left, radii)
+        for _ in range(now):
+            found.append(_take(left, amounts, gains, radii))
+        remaining -= now
+        if remaining == 0:
+            break
+    x, y, scale = (torch.tensor(column) for column in list(zip(*found, strict=True))[:3])
+    centers = torch.stack([x + 0.5, y + 0.5], dim=1)
+    return Places(centers, radii[scale], torch.stack([amount for *_, amount in found]))
+
+
+def _radii(height: int, width: int) -> torch.Tensor:
+    longest = LARGEST * math.sqrt(height * width)
+    steps = (
+        max(1, math.floor(math.log(longest / SMALLEST) / math.log(SCALE)) + 1) if longest > SMALLEST else 1
+    )
+    return SMALLEST * SCALE ** torch.arange(steps, dtype=torch.float32)
+
+
+def _responses(left: torch.Tensor, radii: torch.Tensor) -> tuple[torch.Tensor, torch.Tensor]:
+    """For a disc of every size at every pixel, the best amount [S, C, H, W] and what it gains [S, H, W]."""
+    amounts, gains = [], []
+    for radius in radii.tolist():
+        kernel = _kernel(radius)
+        energy = kernel.square().sum() ** 2  # of the two-dimensional kernel, which is a product
+        fitted = _blur(left, kernel)
+        amounts.append(fitted / energy)
+        gains.append(fitted.square().sum(0) / energy)
+    return torch.stack(amounts), torch.stack(gains)
+
+
+def _kernel(radius: float) -> torch.Tensor:
+    half = max(1, math.ceil(2.5 * WIDTH * radius))
+    offsets = torch.arange(-half, half + 1, dtype=torch.float32)
+    return torch.exp(-0.5 * (offsets / (WIDTH * radius)).square())
+
+
+def _blur(image: torch.Tensor, kernel: torch.Tensor) -> torch.Tensor:
+    half = len(kernel) // 2
+    across = torch.nn.functional.conv2d(image[:, None], kernel[None, None, None, :], padding=(0, half))
+    return torch.nn.functional.conv2d(across, kernel[None, None, :, None], padding=(half, 0))[:, 0]
+
+
+def _take(
+    left: torch.Tensor, amounts: torch.Tensor, gains: torch.Tensor, radii: torch.Tensor
+) -> tuple[int, int, int, torch.Tensor]:
+    """The best disc (x, y, index of its radius, amount); takes it from the residual and bars its surroundings."""
+    _, height, width = gains.shape
+    best = int(gains.argmax())
+    scale, y, x = best // (height * width), best // width % height, best % width
+    amount, radius = amounts[scale, :, y, x].clone(), float(radii[scale])
+    rows, columns = torch.arange(height) - y, torch.arange(width) - x
+    window = lambda offsets: torch.exp(-0.5 * (offsets / (WIDTH * radius)).square())  # noqa: E731
+    left -= amount[:, None, None] * window(rows)[:, None] * window(columns)
+    reach = math.ceil(APART * radius)
+    gains[:, max(0, y - reach) : y + reach + 1, max(0, x - reach) : x + reach + 1] = -1.0
+    return x, y, scale, amount
