@@ -88,7 +88,11 @@ def _convert_parser() -> argparse.ArgumentParser:
     )
     parser.add_argument("--compositing", default="over", help="over (default) or additive")
     parser.add_argument("--preset", default=DEFAULT, help=f"{', '.join(PRESETS)} (default: {DEFAULT})")
-    parser.add_argument("--loss", help=f"{', '.join(api.LOSS_NAMES)} (default: the preset's)")
+    parser.add_argument(
+        "--loss",
+        metavar="LOSS",
+        help=f"{', '.join(api.LOSS_NAMES)}, or several with weights: l1:0.8,ssim:0.2 (default: the preset's)",
+    )
     parser.add_argument(
         "--device", default="auto", choices=api.DEVICES, help="where to fit (default: auto, CUDA if it works)"
     )
@@ -177,14 +181,18 @@ def _convert_one(job: _Job, options: argparse.Namespace) -> bool:
     with _stopping() as stop:
         scene = _fit(picture, options, stop)
         seconds = time.perf_counter() - started
-        quality = api.psnr(scene, picture)
+        quality = _quality(scene, picture)
         early = ", stopped early" if stop.requested else ""
         size = f"{picture.width} x {picture.height}"
-        say(
-            f"{_name(job.source)}: {size}, {scene.shape_count} shapes, PSNR {quality:.2f} dB, {seconds:.1f} s{early}"
-        )
+        say(f"{_name(job.source)}: {size}, {scene.shape_count} shapes, {quality}, {seconds:.1f} s{early}")
         _write_exports(scene, job, options, say)
         return stop.requested
+
+
+def _quality(scene: Scene, picture: Picture) -> str:
+    psnr, flip, (width, height) = api.quality(scene, picture)
+    where = "" if (width, height) == (picture.width, picture.height) else f" at {width} x {height}"
+    return f"PSNR {psnr:.2f} dB, FLIP {flip:.4f}{where}"
 
 
 def _fit(picture: Picture, options: argparse.Namespace, stop: _Stop) -> Scene:

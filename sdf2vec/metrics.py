@@ -1,6 +1,7 @@
 """How far two pictures are apart. All take [C, H, W], sRGB-coded 0..1, and return a 0-dimensional tensor.
 
 Half precision is computed in float32 and stays there, for its rounding would drown what is measured.
+FLIP, which is longer, is in `flip`.
 """
 
 from __future__ import annotations
@@ -15,7 +16,7 @@ _SIGMA = 1.5  # pixels
 
 def mse(a: Tensor, b: Tensor) -> Tensor:
     """Mean squared error over all values. Raises ValueError unless both are [C, H, W] alike."""
-    a, b = _comparable(a, b)
+    a, b = comparable(a, b)
     return (a - b).square().mean()
 
 
@@ -40,7 +41,7 @@ def ssim(a: Tensor, b: Tensor, window: int = 11) -> Tensor:
     """
     if window < 1 or window % 2 == 0:
         raise ValueError(f"window must be odd and positive, got {window}")
-    a, b = _comparable(a, b)
+    a, b = comparable(a, b)
     moments = _local_means(torch.stack([a, b, a * a, b * b, a * b]), window)  # [5, C, H', W']
     mean_a, mean_b, square_a, square_b, product = moments
     variance_a, variance_b = square_a - mean_a * mean_a, square_b - mean_b * mean_b
@@ -52,7 +53,8 @@ def ssim(a: Tensor, b: Tensor, window: int = 11) -> Tensor:
     return similarity.mean()
 
 
-def _comparable(a: Tensor, b: Tensor) -> tuple[Tensor, Tensor]:
+def comparable(a: Tensor, b: Tensor) -> tuple[Tensor, Tensor]:
+    """Both in one floating type, float32 at least. Raises ValueError unless both are [C, H, W] alike, not empty."""
     if a.shape != b.shape or a.ndim != 3 or a.numel() == 0:
         raise ValueError(f"need two [C, H, W] of one shape, got {tuple(a.shape)} and {tuple(b.shape)}")
     dtype = torch.promote_types(torch.promote_types(a.dtype, b.dtype), torch.float32)

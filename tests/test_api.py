@@ -110,7 +110,21 @@ def test_transparency_is_kept(levels):
         ({"kind": ["mixed", "star"]}, "unknown kind 'star'"),
         ({"compositing": "multiply"}, "unknown compositing 'multiply'; choose from over, additive"),
         ({"preset": "slow"}, "unknown preset 'slow'"),
-        ({"loss": "l3"}, "unknown loss 'l3'; choose from l1, mse, ssim"),
+        ({"loss": "l3"}, "unknown loss 'l3'; choose from l1, mse, ssim, flip"),
+        ({"loss": ""}, "unknown loss ''"),
+        ({"loss": "l1,"}, "unknown loss ''"),
+        ({"loss": ()}, "at least one loss"),
+        ({"loss": "l1:0.8,l3:0.2"}, "unknown loss 'l3'"),
+        ({"loss": "l1:a lot"}, "name or name:weight, got 'l1:a lot'"),
+        ({"loss": "l1:"}, "name or name:weight, got 'l1:'"),
+        ({"loss": "l1:1:2"}, "name or name:weight, got 'l1:1:2'"),
+        ({"loss": "l1:0"}, "weight of loss 'l1' must be positive and finite, got 0"),
+        ({"loss": "l1:-1"}, "weight of loss 'l1' .* got -1"),
+        ({"loss": "l1:nan"}, "weight of loss 'l1' .* got nan"),
+        ({"loss": "l1:inf,ssim"}, "weight of loss 'l1' .* got inf"),
+        ({"loss": "l1,ssim,l1:2"}, "loss 'l1' is given twice"),
+        ({"loss": [("l1", None)]}, r"name or name:weight, got \('l1', None\)"),
+        ({"loss": [3]}, "name or name:weight, got 3"),
     ],
 )
 def test_impossible_settings(levels, settings, words):
@@ -227,11 +241,60 @@ def test_check_redraws_exports(require_engine):
     assert all(r.verdict == "same" and r.largest_error <= 0.25 and not r.missing for r in results)
 
 
-def test_psnr_is_that_of_the_8_bit_picture(levels):
-    """By hand: black against white is 0 dB, half grey against white 6.02."""
+def test_quality_is_that_of_the_8_bit_picture():
+    """By hand: black against white is 0 dB, half grey against white 6.02; FLIP as in `test_flip`."""
     white = load(np.full((4, 4, 3), 255, np.uint8))
-    assert api.psnr(Scene(4, 4, (), (0, 0, 0)), white) == pytest.approx(0)
-    assert api.psnr(Scene(4, 4, (), (0.5, 0.5, 0.5)), white) == pytest.approx(20 * np.log10(2))
+    black = api.quality(Scene(4, 4, (), (0, 0, 0)), white)
+    assert black[:2] == pytest.approx((0, 0.967389), abs=1e-4)
+    assert black.flip_size == (4, 4)
+    grey = api.quality(Scene(4, 4, (), (0.5, 0.5, 0.5)), white)
+    assert grey.psnr == pytest.approx(20 * np.log10(2))
+    assert 0.5 < grey.flip < 0.967
+
+
+def test_quality_of_a_transparent_scene():
+    """Nothing against nothing, whatever colour it has; against white it is as black to white, over black only."""
+    nothing, empty = np.zeros((4, 4, 4), np.uint8), Scene(4, 4, (), None)
+    nothing[..., 0] = 200
+    assert api.quality(empty, load(nothing)).flip == 0
+    white = np.full((4, 4, 4), 255, np.uint8)
+    white[0, 0, 3] = 254  # else it counts as opaque
+    assert api.quality(empty, load(white)).flip == pytest.approx(0.967 / 2, abs=0.01)
+
+
+def test_flip_of_a_large_picture_is_computed_on_a_smaller_one(monkeypatch):
+    monkeypatch.setattr(api, "FLIP_RESOLUTION", 20)
+    picture = load(np.full((40, 90, 3), 128, np.uint8))
+    result = api.quality(Scene(90, 40, (), (0.5, 0.5, 0.5)), picture)
+    assert result.flip_size == (30, 13)
+    assert 0 < result.flip < 0.05
+
+
+@pytest.mark.parametrize(
+    ("loss", "expected"),
+    [
+        (None, None),
+        ("flip", (("flip", 1.0),)),
+        ("l1:0.8,ssim:.2", (("l1", 0.8), ("ssim", 0.2))),
+        (" mse : 1e-3, flip", (("mse", 0.001), ("flip", 1.0))),
+        ([("l1", 1), ("ssim", np.float32(0.5))], (("l1", 1.0), ("ssim", 0.5))),
+        (["l1:2", ("flip", 1)], (("l1", 2.0), ("flip", 1.0))),
+    ],
+)
+def test_losses_and_their_weights(loss, expected):
+    assert api.losses_of(loss) == expected
+
+
+def test_every_loss_has_a_name_here():
+    from sdf2vec.fit.losses import LOSSES
+
+    assert tuple(LOSSES) == api.LOSS_NAMES
+
+
+def test_a_mixture_is_fitted(levels):
+    mixture = fit(levels, loss="l1:0.5,flip:0.5")
+    assert mixture == fit(levels, loss=[("l1", 0.5), ("flip", 0.5)])
+    assert mixture != fit(levels, loss="l1")
 
 
 def test_functions_stay_functions():

@@ -110,7 +110,9 @@ def test_names_of_all_outputs(folder, run):
 
 def test_the_summary_names_the_quality_and_every_file(folder, run):
     lines = run("photo.jpg", *SHORT, "--emit", "json", "--emit", "svg,png").out.decode().splitlines()
-    assert re.fullmatch(r"photo\.jpg: 24 x 16, 3 shapes, PSNR \d+\.\d\d dB, \d+\.\d s", lines[0])
+    assert re.fullmatch(
+        r"photo\.jpg: 24 x 16, 3 shapes, PSNR \d+\.\d\d dB, FLIP 0\.\d{4}, \d+\.\d s", lines[0]
+    )
     assert [line.split(":")[0] for line in lines[1:]] == [
         "  photo.scene.json",
         "  photo.svg",
@@ -118,6 +120,19 @@ def test_the_summary_names_the_quality_and_every_file(folder, run):
     ]
     sizes = [int(line.split(": ")[1].split()[0].replace(",", "")) for line in lines[1:]]
     assert sizes == [os.path.getsize(name) for name in ("photo.scene.json", "photo.svg", "photo.render.png")]
+
+
+def test_the_summary_says_at_which_size_flip_was_computed(folder, run, monkeypatch):
+    monkeypatch.setattr(sdf2vec.api, "FLIP_RESOLUTION", 10)
+    line = run("photo.jpg", *SHORT, "--emit", "json").out.decode().splitlines()[0]
+    assert re.search(r"dB, FLIP 0\.\d{4} at 12 x 8, ", line)
+
+
+def test_a_mixture_of_losses(folder, run):
+    assert run("photo.jpg", *SHORT, "--emit", "json", "--loss", "l1:0.8,flip:0.2").code == 0
+    mixture = (folder / "photo.scene.json").read_text()
+    run("photo.jpg", *SHORT, "--emit", "json", "--loss", "l1")
+    assert mixture != (folder / "photo.scene.json").read_text()
 
 
 def test_the_summary_says_how_an_engine_draws_it(folder, run, require_engine):
@@ -224,6 +239,8 @@ def test_same_seed_same_bytes(folder, run):
         (["photo.jpg", "--kind", ","], ["kind"]),
         (["photo.jpg", "--preset", "slow"], ["unknown preset 'slow'", "balanced"]),
         (["photo.jpg", "--loss", "l3"], ["unknown loss 'l3'", "ssim"]),
+        (["photo.jpg", "--loss", "l1:0.8,ssim:"], ["name:weight", "'ssim:'"]),
+        (["photo.jpg", "--loss", "l1:0.8,flip:-1"], ["'flip'", "got -1"]),
         (["photo.jpg", "--compositing", "multiply"], ["unknown compositing 'multiply'", "additive"]),
         (["photo.jpg", "--glsl", "100"], ["unknown GLSL version '100'", "es300"]),
         (["photo.jpg", "--layout", "loose"], ["unknown layout 'loose'"]),

@@ -2,7 +2,7 @@
 
     python -m sdf2vec.bench.quality examples/coffee.png --shapes 64 -o docs/quality.md
 
-FLIP is NVIDIA's own implementation (`flip-evaluator`, LDR, default viewing distance, mean).
+Pictures with alpha are compared premultiplied.
 """
 
 from __future__ import annotations
@@ -19,7 +19,8 @@ import torch
 
 from .. import api
 from ..files import write_atomically
-from ..image import Picture, load
+from ..flip import flip
+from ..image import Picture, load, premultiply
 from ..metrics import psnr, ssim
 from ..render.reference import render
 from ..scene import Scene
@@ -45,26 +46,19 @@ def measure(path: Path, kind: str, compositing: str, shapes: int, preset: str, s
     started = time.perf_counter()
     scene = api.fit(picture, shapes, kind=kind, compositing=compositing, preset=preset, seed=seed)
     seconds = time.perf_counter() - started
-    drawn, target = _eight_bits(scene), _tensor(picture)
-    values = float(psnr(drawn, target)), float(ssim(drawn, target)), flip(drawn, target)
+    target = _tensor(picture)
+    drawn = _eight_bits(scene)[: len(target)]
+    values = float(psnr(drawn, target)), float(ssim(drawn, target)), float(flip(drawn, target))
     return Row(path.stem, kind, compositing, shapes, *values, seconds)
 
 
-def flip(drawn: torch.Tensor, target: torch.Tensor) -> float:
-    """Mean FLIP of two pictures [3, H, W]."""
-    import flip_evaluator
-
-    images = [np.ascontiguousarray(image.permute(1, 2, 0).float().numpy()) for image in (target, drawn)]
-    _, mean, _ = flip_evaluator.evaluate(*images, "LDR", applyMagma=False)
-    return float(mean)
-
-
 def _eight_bits(scene: Scene) -> torch.Tensor:
-    return (render(scene)[:3] * 255).round() / 255
+    return (render(scene) * 255).round() / 255
 
 
 def _tensor(picture: Picture) -> torch.Tensor:
-    return torch.from_numpy(np.ascontiguousarray(picture.pixels[..., :3].transpose(2, 0, 1)))
+    pixels = premultiply(picture.pixels) if picture.has_alpha else picture.pixels
+    return torch.from_numpy(np.ascontiguousarray(pixels.transpose(2, 0, 1)))
 
 
 def table(rows: list[Row], command: str) -> str:

@@ -1,0 +1,288 @@
+"""FLIP: how different two pictures look when one alternates with the other, 0..1 at every pixel.
+
+P. Andersson, J. Nilsson, T. Akenine-Möller, M. Oskarsson, K. Åström, M. D. Fairchild, "FLIP: A Difference
+Evaluator for Alternating Images", Proceedings of the ACM on Computer Graphics and Interactive Techniques 3(2),
+2020. Comments name the steps as the paper does. This is LDR-FLIP as NVIDIA's `flip-evaluator` computes it, for
+any floating type and device.
+
+A picture with alpha, [4, H, W] premultiplied, is seen over black and over white, and the two errors are averaged.
+
+`SMOOTH` makes a training loss of it. Exact FLIP has infinite derivatives where the pictures or their features are
+equal, and none wherever it clamps. So
+
+- clamps (of colours outside 0..1, and of what the filters lead out of gamut) pass derivatives as if they were not
+  there;
+- below a softness, a power less than 1 becomes the parabola through 0 that continues it with the same slope, and
+  the length of a vector is rounded at 0.
+
+The derivative is finite everywhere, and 0 where the pictures are equal.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from functools import cache
+from typing import NamedTuple
+
+import torch
+import torch.nn.functional as F  # noqa: N812
+from torch import Tensor
+
+from .metrics import comparable
+
+# --- the paper's constants ----------------------------------------------------------------------------------
+
+PIXELS_PER_DEGREE = 0.7 * 3840 / 0.7 * math.pi / 180  # 0.7 m from a screen 0.7 m wide with 3840 pixels: 67.02
+
+# Colour pipeline, spatial filtering: contrast sensitivities, Σ a √(π/b) exp(−π² x² / b) for x in degrees.
+ACHROMATIC = (1.0, 0.0047)
+RED_GREEN = (1.0, 0.0053)
+BLUE_YELLOW = (34.1, 0.04), (13.5, 0.025)
+# Colour pipeline, colour metric.
+COLOR_EXPONENT = 0.7  # q_c
+TURNING_SHARE, TURNING_ERROR = 0.4, 0.95  # p_c, p_t: this share of the largest distance becomes this error
+# Feature pipeline.
+FEATURE_WIDTH = 0.082  # w, degrees: of the Gaussian, 2 standard deviations
+FEATURE_EXPONENT = 0.5  # q_f
+
+REACH = 3  # standard deviations that a filter extends from its centre
+
+# Linear sRGB to XYZ relative to D65, which has all three 1: every row sums to 1.
+_XYZ = (
+    (10135552 / 23359437, 8788810 / 23359437, 4435075 / 23359437),
+    (2613072 / 12288897, 8788810 / 12288897, 887015 / 12288897),
+    (1425312 / 80288307, 8788810 / 80288307, 70074185 / 80288307),
+)
+# XYZ to Y, Cx, Cz short of their factors and offset, which the way back from the filters takes off again.
+_OPPONENT = ((0.0, 1.0, 0.0), (1.0, -1.0, 0.0), (0.0, 1.0, -1.0))
+_Y, _CX, _CZ = 0, 1, 2
+LAB_DELTA, LAB_OFFSET = 6 / 29, 4 / 29  # CIELAB: a cube root above δ³, a line below
+
+
+@dataclass(frozen=True)
+class Softness:
+    """The size below which FLIP is smoothed: of distances in CIELAB units, of differences between features."""
+
+    color: float
+    feature: float
+
+
+EXACT = Softness(1e-7, 1e-12)  # only keeps derivatives finite
+SMOOTH = Softness(2e-3, 1e-4)
+
+
+class Appearance(NamedTuple):
+    """What FLIP compares of a picture, over each of B grounds."""
+
+    lab: Tensor  # [B, 3, H, W] what the eye sees of the colours; CIELAB with the Hunt effect
+    features: Tensor  # [B, 2, H, W] strength of edges and of points
+
+
+def flip(image: Tensor, reference: Tensor) -> Tensor:
+    """Mean FLIP, 0..1, 0 for equal pictures: a 0-dimensional tensor.
+
+    Both [3, H, W], sRGB-coded, clamped to 0..1; or [4, H, W] premultiplied. Seen at 67 pixels per degree.
+    Raises ValueError for other shapes and when they differ.
+    """
+    return flip_map(image, reference).mean()
+
+
+def flip_map(image: Tensor, reference: Tensor) -> Tensor:
+    """FLIP at every pixel, [H, W]; see `flip`."""
+    image, reference = comparable(image, reference)
+    return error(appearance(image, EXACT), appearance(reference, EXACT), EXACT).mean(dim=0)
+
+
+def appearance(image: Tensor, softness: Softness) -> Appearance:
+    """What FLIP compares of [3, H, W], or of [4, H, W] premultiplied. Raises ValueError for another shape."""
+    filters = filters_for(image.dtype, image.device)
+    filtered = filters(_linear(_clamped(over_grounds(image))))  # [B, 8, H, W]
+    opponent, derivatives = filtered.split(4, dim=1)
+    colors = _clamped(_mix(filters.to_rgb, opponent))
+    features = _length(derivatives.unflatten(1, (2, 2)), 2, softness.feature)
+    return Appearance(_lab(_mix(filters.to_xyz, colors)), features)
+
+
+def error(a: Appearance, b: Appearance, softness: Softness) -> Tensor:
+    """The final difference, [B, H, W]: the colour error, raised to 1 − the feature error."""
+    difference = a.lab - b.lab
+    distance = difference[:, 0].abs() + _length(difference[:, 1:], 1, softness.color)  # HyAB
+    features = (a.features - b.features).abs().amax(dim=1) / math.sqrt(2)
+    exponent = 1 - _power(features, FEATURE_EXPONENT, softness.feature)
+    large = _redistributed(distance.clamp(min=softness.color) ** COLOR_EXPONENT)
+    return large**exponent * _toe(distance, COLOR_EXPONENT * exponent, softness.color)
+
+
+# --- colours ------------------------------------------------------------------------------------------------
+
+
+def over_grounds(image: Tensor) -> Tensor:
+    """[1, 3, H, W]; with alpha [2, 3, H, W], over black and over white."""
+    if image.ndim != 3 or image.shape[0] not in (3, 4):
+        raise ValueError(f"need [3, H, W] or [4, H, W], got {tuple(image.shape)}")
+    color, alpha = image[:3], image[3:]
+    return torch.stack([color, color + (1 - alpha)]) if len(alpha) else color[None]
+
+
+def _clamped(values: Tensor) -> Tensor:
+    """Clamped to 0..1, with the derivative of what was not clamped."""
+    still = values.detach()
+    return still.clamp(0, 1) + (values - still)
+
+
+def _linear(coded: Tensor) -> Tensor:
+    """sRGB-coded 0..1 to linear (IEC 61966-2-1)."""
+    return torch.where(coded <= 0.04045, coded / 12.92, ((coded + 0.055) / 1.055) ** 2.4)
+
+
+def _lab(xyz: Tensor) -> Tensor:
+    """CIELAB of XYZ relative to white, with the Hunt effect: colours fade with lightness. [B, 3, H, W]."""
+    dark = 1 / (3 * LAB_DELTA**2)
+    root = torch.where(xyz > LAB_DELTA**3, xyz.clamp(min=LAB_DELTA**3) ** (1 / 3), dark * xyz + LAB_OFFSET)
+    x, y, z = root.unbind(dim=1)
+    lightness = 116 * y - 16
+    return torch.stack([lightness, 5 * lightness * (x - y), 2 * lightness * (y - z)], dim=1)
+
+
+def _mix(matrix: Tensor, planes: Tensor) -> Tensor:
+    """Every pixel's vector by a matrix [M, N]: [B, N, H, W] to [B, M, H, W]."""
+    mixed: Tensor = (matrix @ planes.flatten(2)).unflatten(2, planes.shape[2:])
+    return mixed
+
+
+# --- the errors' scale --------------------------------------------------------------------------------------
+
+
+def _redistributed(powered: Tensor) -> Tensor:
+    """Colour distances, to the power of q_c, mapped to 0..1: most of the range to the small ones."""
+    largest = largest_distance() ** COLOR_EXPONENT
+    turn = TURNING_SHARE * largest
+    small = powered * (TURNING_ERROR / turn)
+    large = TURNING_ERROR + (powered - turn) * ((1 - TURNING_ERROR) / (largest - turn))
+    return torch.minimum(small, large)  # as the first one is steeper
+
+
+@cache
+def largest_distance() -> float:
+    """Between green and blue, by HyAB."""
+    primaries = torch.tensor(_XYZ, dtype=torch.float64)[:, 1:].T[:, :, None, None]
+    light, *chroma = (_lab(primaries)[0] - _lab(primaries)[1]).flatten().tolist()
+    return float(abs(light) + math.hypot(*chroma))
+
+
+def _power(x: Tensor, exponent: float, softness: float) -> Tensor:
+    """x to a power below 1, for x ≥ 0, with a finite slope at 0."""
+    return x.clamp(min=softness) ** exponent * _toe(x, exponent, softness)
+
+
+def _toe(x: Tensor, exponent: Tensor | float, softness: float) -> Tensor:
+    """What turns a constant power into a parabola below the softness: 1 above it, 0 at 0."""
+    t = (x / softness).clamp(max=1)
+    return t * (2 - exponent - (1 - exponent) * t)
+
+
+def _length(vectors: Tensor, dim: int, softness: float) -> Tensor:
+    """Euclidean lengths, rounded at 0."""
+    return (vectors.square().sum(dim=dim) + softness**2).sqrt() - softness
+
+
+# --- filters ------------------------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True)
+class Filters:
+    """All of FLIP's filters, each one across and one down; what lies outside repeats the edge.
+
+    The first four planes are Y, Cx and the two parts of Cz as the eye resolves them, the others the derivatives
+    of Y across and down: first order, second order.
+    """
+
+    to_planes: Tensor  # [8, 3] from linear RGB
+    across: Tensor  # [8, 1, 1, K]
+    down: Tensor  # [8, 1, K, 1]
+    to_rgb: Tensor  # [3, 4] linear RGB from the first four planes
+    to_xyz: Tensor  # [3, 3] from linear RGB
+
+    def __call__(self, linear: Tensor) -> Tensor:
+        """[B, 3, H, W] to [B, 8, H, W]."""
+        reach = self.across.shape[3] // 2
+        padded = F.pad(linear, (reach, reach, reach, reach), mode="replicate")
+        planes = _mix(self.to_planes, padded)
+        for kernels in (self.across, self.down):
+            planes = F.conv2d(planes, kernels, groups=len(kernels))
+        return planes
+
+
+@cache
+def filters_for(dtype: torch.dtype, device: torch.device) -> Filters:
+    """FLIP's filters for pictures of a type on a device."""
+    planes, across, down = zip(*_bank(), strict=True)
+    to_xyz = torch.tensor(_XYZ, dtype=torch.float64)
+    to_opponent = torch.tensor(_OPPONENT, dtype=torch.float64) @ to_xyz
+    to_rgb = torch.linalg.inv(to_opponent)[:, planes[:4]]
+    tensors = (
+        to_opponent[planes, :],
+        torch.stack(across)[:, None, None, :],
+        torch.stack(down)[:, None, :, None],
+        to_rgb,
+        to_xyz,
+    )
+    return Filters(*(tensor.to(device, dtype).contiguous() for tensor in tensors))
+
+
+def _bank() -> list[tuple[int, Tensor, Tensor]]:
+    """The filters: of which opponent plane, kernel across, kernel down; kernels of one length."""
+    sensitivities = ACHROMATIC, RED_GREEN, *BLUE_YELLOW
+    deviations = [math.sqrt(b / 2) / math.pi * PIXELS_PER_DEGREE for _, b in sensitivities]
+    offsets = _offsets(max(deviations))
+    y, cx, wide, narrow = (_gaussian(offsets, deviation) for deviation in deviations)
+    wide_share, narrow_share = _shares(wide, narrow)
+    smooth, first, second = (F.pad(k, [(len(y) - len(k)) // 2] * 2) for k in _feature_kernels())
+    return [
+        (_Y, _unit(y), _unit(y)),
+        (_CX, _unit(cx), _unit(cx)),
+        (_CZ, wide_share * _unit(wide), _unit(wide)),
+        (_CZ, narrow_share * _unit(narrow), _unit(narrow)),
+        (_Y, first, smooth),
+        (_Y, smooth, first),
+        (_Y, second, smooth),
+        (_Y, smooth, second),
+    ]
+
+
+def _shares(wide: Tensor, narrow: Tensor) -> tuple[float, float]:
+    """What each of the two Gaussians of Cz has of their sum over the plane."""
+    volumes = [
+        a * math.sqrt(math.pi / b) * float(kernel.sum()) ** 2
+        for (a, b), kernel in zip(BLUE_YELLOW, (wide, narrow), strict=True)
+    ]
+    return volumes[0] / sum(volumes), volumes[1] / sum(volumes)
+
+
+def _feature_kernels() -> tuple[Tensor, Tensor, Tensor]:
+    """A Gaussian and its derivatives of first and second order."""
+    deviation = FEATURE_WIDTH / 2 * PIXELS_PER_DEGREE
+    x = _offsets(deviation)
+    gaussian = _gaussian(x, deviation)
+    first, second = -x * gaussian, ((x / deviation) ** 2 - 1) * gaussian
+    return _unit(gaussian), _balanced(first), _balanced(second)
+
+
+def _offsets(deviation: float) -> Tensor:
+    reach = math.ceil(REACH * deviation)
+    return torch.arange(-reach, reach + 1, dtype=torch.float64)
+
+
+def _gaussian(x: Tensor, deviation: float) -> Tensor:
+    return torch.exp(-0.5 * (x / deviation) ** 2)
+
+
+def _unit(kernel: Tensor) -> Tensor:
+    return kernel / kernel.sum()
+
+
+def _balanced(kernel: Tensor) -> Tensor:
+    """Positive weights sum to 1, negative ones to −1."""
+    rise, fall = kernel.clamp(min=0), kernel.clamp(max=0)
+    return rise / rise.sum() - fall / fall.sum()
