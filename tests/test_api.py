@@ -25,7 +25,8 @@ if TYPE_CHECKING:
 @pytest.fixture(autouse=True)
 def short_fits(monkeypatch):
     """Three steps a phase: what is tested here is not the fit."""
-    monkeypatch.setitem(PRESETS, "fast", tuple(replace(phase, steps=3) for phase in PRESETS["fast"]))
+    short = tuple(replace(phase, steps=3) for phase in PRESETS["fast"].phases)
+    monkeypatch.setitem(PRESETS, "fast", replace(PRESETS["fast"], phases=short))
 
 
 @pytest.fixture(scope="module")
@@ -148,10 +149,12 @@ def test_the_callback_sees_every_step(levels):
         return False
 
     scene = fit(levels, callback=note)
-    steps = 3 * len(PRESETS["fast"])
+    steps = PRESETS["fast"].steps
     assert [progress.step for progress in seen] == list(range(1, steps + 1))
     assert {progress.steps for progress in seen} == {steps}
-    assert list(dict.fromkeys(progress.phase for progress in seen)) == [p.name for p in PRESETS["fast"]]
+    assert list(dict.fromkeys(progress.phase for progress in seen)) == [
+        p.name for p in PRESETS["fast"].phases
+    ]
     assert all(0 < progress.loss < 10 for progress in seen)
     assert scene == fit(levels)
 

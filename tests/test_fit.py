@@ -9,8 +9,8 @@ import torch
 import sdf2vec
 from sdf2vec.fit import constraints, loop, losses
 from sdf2vec.fit.loop import Progress, Settings, fit_picture, scaled
-from sdf2vec.fit.placing import detail, place
-from sdf2vec.fit.presets import PRESETS, RATES
+from sdf2vec.fit.placing import Layers, detail, place
+from sdf2vec.fit.presets import PRESETS, RATES, Start
 from sdf2vec.image import Picture
 from sdf2vec.metrics import mse, psnr
 from sdf2vec.render import culled, device, triton_fused
@@ -93,7 +93,7 @@ def test_progress_and_stopping():
 
     scene = fit_picture(picture(), Settings(4, ("box",), preset="fast"), callback)
     assert [p.step for p in seen] == list(range(1, 8))
-    assert {p.steps for p in seen} == {sum(phase.steps for phase in PRESETS["fast"])}
+    assert {p.steps for p in seen} == {PRESETS["fast"].steps}
     assert all(math.isfinite(p.loss) for p in seen)
     assert scene.shape_count == 4
 
@@ -112,7 +112,7 @@ def test_shapes_start_where_the_picture_has_detail():
     assert float(density.sum()) == pytest.approx(1.0)
     assert float(density[:17, :17].sum()) > 0.6
     generator = torch.Generator().manual_seed(0)
-    tensors = place(pixels, (1.0, 1.0), ["circle"], 100, "over", generator)
+    tensors = place(pixels, (1.0, 1.0), Layers(("circle",), "over"), 100, Start(), generator)
     centers = tensors.groups[0].parameters["center"][:, 0]
     radii = tensors.groups[0].parameters["radius"][:, 0, 0]
     corner = (centers < -0.25).all(dim=1)

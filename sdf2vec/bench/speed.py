@@ -23,7 +23,8 @@ from ..expr import Expr
 from ..files import write_atomically
 from ..fit.loop import adam
 from ..fit.losses import l1
-from ..fit.placing import place
+from ..fit.placing import Layers, place
+from ..fit.presets import Start
 from ..fit.ssim import Dissimilarity
 from ..lower.block import dependent, derivatives
 from ..metrics import ssim
@@ -43,7 +44,8 @@ def picture(side: int) -> torch.Tensor:
 
 def scene(kinds: list[str], count: int, target: torch.Tensor, compositing: str = "over") -> SceneTensors:
     """What a fit starts with."""
-    return place(target, (1.0, 1.0), kinds, count, compositing, torch.Generator().manual_seed(0))
+    layers = Layers(tuple(kinds), compositing)
+    return place(target, (1.0, 1.0), layers, count, Start(), torch.Generator().manual_seed(0))
 
 
 def seconds(run: Callable[[], object], least: float = 1.0) -> float:

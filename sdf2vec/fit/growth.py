@@ -6,6 +6,7 @@ What is decided is pure; `exchange` alone changes a scene, and Adam's state with
 from __future__ import annotations
 
 from collections.abc import Sequence
+from functools import partial
 
 import torch
 
@@ -29,14 +30,8 @@ def importance(image: torch.Tensor, tensors: SceneTensors, generator: torch.Gene
         signs = torch.randint(0, 2, image.shape, generator=generator).float() * 2 - 1
         grads = torch.autograd.grad(image, leaves, signs.to(image.device), retain_graph=True)
         for total, leaf, grad in zip(totals, leaves, grads, strict=True):
-            total += (
-                (leaf.detach() * grad)
-                .flatten(1 if leaf.dim() > 1 else 0)
-                .reshape(len(leaf), -1)
-                .sum(1)
-                .square()
-                .cpu()
-            )
+            change = (leaf.detach() * grad).reshape(len(leaf), -1).sum(1)
+            total += change.square().cpu()
     return totals
 
 
@@ -63,7 +58,7 @@ def newcomers(
     `weights` [H, W]: how much an error matters.
     """
     image, target = image.detach().cpu(), target.cpu()
-    residual = target - image if weights is None else (target - image) * weights.cpu().sqrt()
+    residual = target - image if weights is None else (target - image) * weights.cpu()
     found = find_places(residual, count)
     height, width = target.shape[1:]
     centers = (found.centers / torch.tensor([width, height]) - 0.5) * torch.tensor(tensors.size)
@@ -90,17 +85,21 @@ def exchange(
     for index, rows in enumerate(stays):
         old = tensors.groups[index]
         new = next((group for group in fresh if _same(group, old)), None)
-        kept = old.each(lambda tensor, rows=rows: tensor.detach()[rows.to(tensor.device)])  # type: ignore[misc]
-        joined = (
-            kept
-            if new is None
-            else kept.joined(new.each(lambda tensor, old=old: tensor.to(old.order.device)))
-        )  # type: ignore[misc]
+        kept = old.each(partial(_rows_of, rows))
+        joined = kept if new is None else kept.joined(new.each(partial(_beside, old.order)))
         tensors.groups[index] = joined
         for (_, before), (_, after) in zip(old.tensors(), joined.tensors(), strict=True):
             _replace(optimizer, before, after, rows)
     tensors.groups += [new for new in fresh if not any(_same(new, old) for old in tensors.groups)]
     _renumber(tensors.groups)
+
+
+def _rows_of(rows: torch.Tensor, tensor: torch.Tensor) -> torch.Tensor:
+    return tensor.detach()[rows.to(tensor.device)]
+
+
+def _beside(other: torch.Tensor, tensor: torch.Tensor) -> torch.Tensor:
+    return tensor.to(other.device)
 
 
 def _same(a: Group, b: Group) -> bool:

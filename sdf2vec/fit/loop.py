@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterator
+from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from functools import partial
 
@@ -37,10 +38,10 @@ class Settings:
     """What to fit and how.
 
     `kinds`: names in `shapes.KINDS`; `union`: shapes joined in each layer; `loss`: replaces the preset's, when given;
-    `least_area`: of a shape, in shares of the canvas, None leaves it to the preset; `start`: a scene to go on
-    from, at any size; `trials`: how often a few layers are tried elsewhere at the end; `palette`: the only colours
-    there may be; `colors`: how many there may be, when no palette is given, 0 for any; `weights`: how much an error matters, [H, W], of the picture's size; `device`: auto, cpu,
-    cuda or mps.
+    `least_area`: of a shape, in shares of the canvas, None leaves it to the preset; `start`: a scene to go on from,
+    at any size; `trials`: how often a few layers are tried elsewhere at the end; `palette`: the only colours there
+    may be; `colors`: how many there may be where no palette is given, 0 for any; `weights`: how much an error
+    matters, 0..1, [H, W], of the picture's size; `device`: auto, cpu, cuda or mps.
     """
 
     shapes: int = 256
@@ -77,7 +78,7 @@ class Progress:
 Callback = Callable[[Progress], bool]  # returns True to stop
 
 
-class Stopped(Exception):
+class Stopped(Exception):  # noqa: N818 (no error)
     """The callback wants the fit to end."""
 
 
@@ -89,10 +90,8 @@ def fit_picture(picture: Picture, settings: Settings, callback: Callback = lambd
     """
     with threads_of_its_own():
         fit = Fit(picture, settings, callback)
-        try:
+        with suppress(Stopped):
             fit.run()
-        except Stopped:
-            pass
     return to_scene(fit.tensors, picture.width, picture.height)
 
 
@@ -188,8 +187,7 @@ class Fit:
         target = scaled(self.pixels, phase.resolution).to(self.device.name)
         weights = None
         if self.settings.weights is not None:
-            small = scaled(self.settings.weights[..., None], phase.resolution)[0].to(self.device.name)
-            weights = small / small.mean()
+            weights = scaled(self.settings.weights[..., None], phase.resolution)[0].to(self.device.name)
         return Stage(phase, target, weights, objective(phase.loss, target, weights))
 
     def _draw(self, tensors: SceneTensors, target: torch.Tensor) -> torch.Tensor:
@@ -334,10 +332,10 @@ def _rates(phase: Phase) -> Iterator[float]:
 def scaled(pixels: np.ndarray, resolution: float) -> torch.Tensor:
     """A picture, premultiplied [H, W, C], scaled down to about resolution² pixels, [C, H, W]; never up.
 
-    A resolution up to 1 is a share of the picture's own.
+    A resolution below 1 is a share of the picture's own.
     """
     height, width, channels = pixels.shape
-    factor = resolution if resolution <= 1 else min(1.0, resolution / math.sqrt(width * height))
+    factor = resolution if resolution < 1 else min(1.0, resolution / math.sqrt(width * height))
     size = max(1, round(width * factor)), max(1, round(height * factor))
     small = premultiply(resize(unpremultiply(pixels), *size)) if channels == 4 else resize(pixels, *size)
     return torch.from_numpy(np.ascontiguousarray(small.transpose(2, 0, 1)))

@@ -49,7 +49,14 @@ LOSSES: dict[str, Callable[[torch.Tensor], Objective]] = {
 }
 
 
-def objective(loss: Loss, target: torch.Tensor) -> Objective:
-    """The weighted sum of named losses, for one target."""
+def objective(loss: Loss, target: torch.Tensor, weights: torch.Tensor | None = None) -> Objective:
+    """The weighted sum of named losses, for one target.
+
+    With `weights` [H, W], 0..1, every loss sees that share of each pixel's error only.
+    """
     terms = [(weight, LOSSES[name](target)) for name, weight in loss]
-    return lambda render: torch.stack([weight * term(render) for weight, term in terms]).sum()
+
+    def total(render: torch.Tensor) -> torch.Tensor:
+        return torch.stack([weight * term(render) for weight, term in terms]).sum()
+
+    return total if weights is None else lambda render: total(target + weights * (render - target))

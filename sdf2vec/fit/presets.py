@@ -31,7 +31,7 @@ class Relocation:
 class Phase:
     """A stretch of the fit at one resolution.
 
-    `resolution`: the picture is scaled down to about this many pixels squared; up to 1, to this share of its
+    `resolution`: the picture is scaled down to about this many pixels squared; below 1, to this share of its
     sides. `rate` and `end_rate` scale all learning rates at the start and at the end, along half a cosine. With
     `batches`, the layers are trained in so many parts, one after the other, each for all steps, the others frozen.
     """

@@ -31,8 +31,7 @@ def find_places(residual: torch.Tensor, count: int) -> Places:
     for rounds_left in range(ROUNDS, 0, -1):
         now = math.ceil(remaining / rounds_left)
         amounts, gains = _responses(left, radii)
-        for _ in range(now):
-            found.append(_take(left, amounts, gains, radii))
+        found += [_take(left, amounts, gains, radii) for _ in range(now)]
         remaining -= now
         if remaining == 0:
             break
@@ -63,7 +62,10 @@ def _responses(left: torch.Tensor, radii: torch.Tensor) -> tuple[torch.Tensor, t
 
 def _kernel(radius: float) -> torch.Tensor:
     half = max(1, math.ceil(2.5 * WIDTH * radius))
-    offsets = torch.arange(-half, half + 1, dtype=torch.float32)
+    return _window(torch.arange(-half, half + 1), radius)
+
+
+def _window(offsets: torch.Tensor, radius: float) -> torch.Tensor:
     return torch.exp(-0.5 * (offsets / (WIDTH * radius)).square())
 
 
@@ -81,9 +83,8 @@ def _take(
     best = int(gains.argmax())
     scale, y, x = best // (height * width), best // width % height, best % width
     amount, radius = amounts[scale, :, y, x].clone(), float(radii[scale])
-    rows, columns = torch.arange(height) - y, torch.arange(width) - x
-    window = lambda offsets: torch.exp(-0.5 * (offsets / (WIDTH * radius)).square())  # noqa: E731
-    left -= amount[:, None, None] * window(rows)[:, None] * window(columns)
+    down, across = (_window(torch.arange(side) - at, radius) for side, at in ((height, y), (width, x)))
+    left -= amount[:, None, None] * down[:, None] * across
     reach = math.ceil(APART * radius)
     gains[:, max(0, y - reach) : y + reach + 1, max(0, x - reach) : x + reach + 1] = -1.0
     return x, y, scale, amount
