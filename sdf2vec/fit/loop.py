@@ -23,7 +23,7 @@ from .growth import exchange, importance, least, newcomers
 from .losses import Objective, objective
 from .palette import found, snap
 from .placing import Layers, background_of, empty_groups, place
-from .presets import DEFAULT, LENGTHS, PRESETS, RATES, Loss, Phase, Preset, Start
+from .presets import CROWDED, CROWDING, DEFAULT, LENGTHS, MANY, PRESETS, RATES, Loss, Phase, Preset, Start
 
 WIDEN_EVERY = 10  # steps
 AREA_WEIGHT = 1.0  # of the area constraint in the loss
@@ -149,7 +149,7 @@ class Fit:
         return steps + (REFIT_STEPS if self.settings.palette or self.settings.colors else 0)
 
     def _start(self) -> SceneTensors:
-        target = scaled(self.pixels, self.phases[0].resolution)
+        target = scaled(self.pixels, self._resolution(self.phases[0]))
         settings, layers = self.settings, self.settings.layers
         if settings.start is None:
             count = settings.shapes // settings.union
@@ -184,11 +184,15 @@ class Fit:
             self.callback(Progress("compiling kernels (once)", 0, self.steps, math.nan))
 
     def _stage(self, phase: Phase) -> Stage:
-        target = scaled(self.pixels, phase.resolution).to(self.device.name)
+        resolution = self._resolution(phase)
+        target = scaled(self.pixels, resolution).to(self.device.name)
         weights = None
         if self.settings.weights is not None:
-            weights = scaled(self.settings.weights[..., None], phase.resolution)[0].to(self.device.name)
+            weights = scaled(self.settings.weights[..., None], resolution)[0].to(self.device.name)
         return Stage(phase, target, weights, objective(phase.loss, target, weights))
+
+    def _resolution(self, phase: Phase) -> float:
+        return self.preset.resolution(phase, self.settings.shapes)
 
     def _draw(self, tensors: SceneTensors, target: torch.Tensor) -> torch.Tensor:
         channels, height, width = target.shape
@@ -306,10 +310,7 @@ def adam(tensors: SceneTensors, frozen: tuple[str, ...] = ()) -> torch.optim.Ada
         free.append(("background", tensors.background))
         if tensors.compositing == "additive":
             frozen = (*frozen, "opacity")
-    scale = math.sqrt(tensors.size[0] * tensors.size[1])  # of the canvas, and so of what lies on it
-    rates = (
-        RATES | {name: RATES[name] * scale for name in LENGTHS} | {"frequency": RATES["frequency"] / scale}
-    )
+    rates = _rates_for(tensors)
     return torch.optim.Adam(
         [
             {"params": [tensor.detach_().requires_grad_()], "lr": 0.0, "base_rate": rates[name]}
@@ -320,6 +321,15 @@ def adam(tensors: SceneTensors, frozen: tuple[str, ...] = ()) -> torch.optim.Ada
         eps=1e-12,
         fused=True,
     )
+
+
+def _rates_for(tensors: SceneTensors) -> dict[str, float]:
+    """`RATES` for a canvas of this size with so many layers."""
+    canvas = math.sqrt(tensors.size[0] * tensors.size[1])
+    crowd = (MANY / max(1, tensors.layer_count)) ** CROWDING
+    rates = RATES | {name: RATES[name] * crowd for name in CROWDED}
+    rates |= {name: rates[name] * canvas for name in LENGTHS}
+    return rates | {"frequency": rates["frequency"] / canvas}
 
 
 def _rates(phase: Phase) -> Iterator[float]:

@@ -7,6 +7,8 @@ from typing import Literal
 
 Loss = tuple[tuple[str, float], ...]  # name in `losses.LOSSES`, weight
 
+MANY = 256  # shapes beyond which the phases' resolution grows
+
 L1: Loss = (("l1", 1.0),)
 MSE: Loss = (("mse", 1.0),)
 
@@ -66,7 +68,8 @@ class Start:
 @dataclass(frozen=True)
 class Preset:
     """A whole fit. `compositing`: the only one that it is for; `falloff`: its range in scene units;
-    `least_area`: of a shape, in shares of the canvas; smaller ones are pushed to grow.
+    `least_area`: of a shape, in shares of the canvas; smaller ones are pushed to grow; `sharpens`: whether the
+    phases' resolution grows with the number of shapes.
     """
 
     phases: tuple[Phase, ...]
@@ -74,6 +77,13 @@ class Preset:
     compositing: str | None = None
     falloff: tuple[float, float] = (0.0, 1.5)
     least_area: float = 0.0
+    sharpens: bool = True
+
+    def resolution(self, phase: Phase, shapes: int) -> float:
+        """A phase's resolution for so many shapes: what is drawn with many needs more pixels to tell them apart."""
+        if not self.sharpens or phase.resolution < 1:
+            return phase.resolution
+        return phase.resolution * max(1.0, shapes / MANY) ** 0.25
 
     @property
     def steps(self) -> int:
@@ -81,27 +91,28 @@ class Preset:
         return sum(phase.total for phase in self.phases)
 
 
-OFTEN = Relocation(every=20, share=0.05)
+L1_FLIP: Loss = (("l1", 1.0), ("flip", 0.2))
+OFTEN = Relocation(every=25, share=0.05)
 
 PRESETS: dict[str, Preset] = {
     "fast": Preset(
         (
-            Phase("coarse", 150, 64, loss=MSE, relocation=OFTEN),
-            Phase("fine", 100, 128, rate=0.8, end_rate=0.03),
+            Phase("coarse", 200, 64, relocation=OFTEN),
+            Phase("fine", 120, 160, rate=0.6, end_rate=0.03),
         )
     ),
     "balanced": Preset(
         (
             Phase("coarse", 300, 96, relocation=OFTEN),
             Phase("middle", 250, 128, rate=0.8, end_rate=0.4, relocation=OFTEN),
-            Phase("fine", 150, 256, rate=0.4, end_rate=0.02),
+            Phase("fine", 150, 320, rate=0.4, end_rate=0.02, loss=L1_FLIP),
         )
     ),
     "best": Preset(
         (
             Phase("coarse", 600, 96, relocation=OFTEN),
-            Phase("middle", 700, 192, rate=0.8, end_rate=0.4, relocation=OFTEN),
-            Phase("fine", 500, 384, rate=0.4, end_rate=0.01),
+            Phase("middle", 800, 192, rate=0.8, end_rate=0.4, relocation=OFTEN),
+            Phase("fine", 400, 512, rate=0.4, end_rate=0.02, loss=L1_FLIP),
         )
     ),
     # Of the thesis. It leaves open: where shapes start (anywhere), the size of a batch (a quarter of the layers), the
@@ -114,6 +125,7 @@ PRESETS: dict[str, Preset] = {
         Start("uniform", "zero", 0.5),
         compositing="additive",
         falloff=(0.01, 0.99),
+        sharpens=False,
         least_area=3e-4,
     ),
 }
@@ -125,10 +137,12 @@ RATES = {
     "length": 0.003,
     "angle": 0.03,
     "frequency": 0.3,
-    "color": 0.02,
-    "opacity": 0.015,
+    "color": 0.014,
+    "opacity": 0.01,
     "falloff": 0.01,
     "smoothness": 0.003,
     "background": 0.01,
 }
 LENGTHS = ("position", "length", "falloff", "smoothness")  # grow with the canvas
+CROWDED = (*LENGTHS, "color", "opacity")  # fall with the number of layers: smaller ones take smaller steps
+CROWDING = 0.35  # by this power of it
