@@ -7,8 +7,9 @@ import torch
 
 from sdf2vec import flip as module
 from sdf2vec.fit.loop import Settings, fit_picture
+from sdf2vec.fit.flip import Flip
 from sdf2vec.fit.losses import LOSSES
-from sdf2vec.flip import SMOOTH, appearance, error, flip, flip_map
+from sdf2vec.flip import SMOOTH, Softness, appearance, error, flip, flip_map
 from sdf2vec.image import Picture, load, resize
 from sdf2vec.render.draw import draw
 
@@ -150,6 +151,21 @@ def test_the_kernels_compute_what_torch_does(shape):
         target[:3] *= target[3:]
     expected, exact = differentiated(smooth_loss, render.double(), target.double())
     value, gradient = loss_and_gradient(render, target)
+    assert value == pytest.approx(expected, abs=1e-6)
+    np.testing.assert_allclose(gradient, exact, atol=1e-4 * float(exact.abs().max()))
+
+
+def test_the_kernels_compute_what_torch_does_below_the_softness(monkeypatch):
+    """With so large a softness that most errors lie below it."""
+    softness = Softness(20, 0.1)
+    monkeypatch.setattr(module, "SMOOTH", softness)
+    target, render = noise(3, 40, 21), noise(3, 40, 21, seed=1)
+
+    def soft_loss(image):
+        return error(appearance(image, softness), appearance(target.double(), softness), softness).mean()
+
+    expected, exact = differentiated(soft_loss, render.double())
+    value, gradient = differentiated(Flip(target), render)
     assert value == pytest.approx(expected, abs=1e-6)
     np.testing.assert_allclose(gradient, exact, atol=1e-4 * float(exact.abs().max()))
 
