@@ -15,6 +15,14 @@ from sdf2vec.fit.presets import PRESETS, Phase, Preset
 from sdf2vec.flip import SMOOTH, Softness, appearance, error, flip, flip_map
 from sdf2vec.image import Picture, load, resize
 from sdf2vec.render.draw import draw
+from sdf2vec.render.fused import threads_of_its_own
+
+
+@pytest.fixture(autouse=True)
+def one_thread():
+    """The pictures are too small to be worth sharing; waiting for each other takes longer."""
+    with threads_of_its_own():
+        yield
 
 
 def by_nvidia(image, reference):
