@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import inspect
 import signal
 import sys
 import time
@@ -11,7 +12,7 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from types import FrameType
-from typing import TYPE_CHECKING, BinaryIO, Literal, NoReturn
+from typing import TYPE_CHECKING, Any, BinaryIO, Literal, NoReturn
 
 from . import __version__, api
 from .errors import Sdf2vecError
@@ -19,6 +20,7 @@ from .export import EXPORTERS
 from .export.options import GLSL_VERSIONS, LAYOUTS, Options
 from .files import one_line, require_writable, write_atomically
 from .fit.presets import DEFAULT, PRESETS
+from .fit.settings import DEVICES, LOSS_NAMES, settings_of
 from .image import Picture, load
 from .scene import Scene
 from .scene import load as load_scene
@@ -79,28 +81,51 @@ def _convert_parser() -> argparse.ArgumentParser:
     parser.add_argument("inputs", nargs="+", metavar="INPUT", help="pictures; - reads standard input")
     _add_emit(parser, "glsl")
     _add_output(parser)
-    parser.add_argument("--shapes", type=int, default=256, metavar="N", help="how many shapes (default: 256)")
-    parser.add_argument(
-        "--kind",
-        default="triangle",
-        metavar="KIND",
-        help=f"{', '.join(KINDS)}, mixed, or several: box,circle",
-    )
-    parser.add_argument("--compositing", default="over", help="over (default) or additive")
-    parser.add_argument("--preset", default=DEFAULT, help=f"{', '.join(PRESETS)} (default: {DEFAULT})")
-    parser.add_argument(
-        "--loss",
-        metavar="LOSS",
-        help=f"{', '.join(api.LOSS_NAMES)}, or several with weights: l1:0.8,ssim:0.2 (default: the preset's)",
-    )
-    parser.add_argument(
-        "--device", default="auto", choices=api.DEVICES, help="where to fit (default: auto, CUDA if it works)"
-    )
-    parser.add_argument("--seed", type=int, default=0, help="the same seed gives the same scene (default: 0)")
+    _add_settings(parser.add_argument_group("fit"))
     _add_options(parser)
     parser.add_argument("--quiet", action="store_true", help="print errors only")
     parser.add_argument("--version", action="version", version=f"sdf2vec {__version__}")
     return parser
+
+
+def _add_settings(group: argparse._ArgumentGroup) -> None:
+    """The options of a fit; their names are those of `api.fit`."""
+    group.add_argument("--shapes", type=int, default=256, metavar="N", help="how many shapes (default: 256)")
+    group.add_argument(
+        "--kind",
+        default="triangle",
+        metavar="KIND",
+        help=f"{', '.join(KINDS)}, mixed, or several: box,circle (default: triangle)",
+    )
+    group.add_argument(
+        "--union", type=int, default=1, metavar="K", help="join K shapes smoothly in each layer"
+    )
+    group.add_argument("--compositing", help="over or additive (default: over)")
+    group.add_argument("--preset", default=DEFAULT, help=f"{', '.join(PRESETS)} (default: {DEFAULT})")
+    group.add_argument(
+        "--loss",
+        metavar="LOSS",
+        help=f"{', '.join(LOSS_NAMES)}, or several with weights: l1:0.8,ssim:0.2 (default: the preset's)",
+    )
+    group.add_argument("--seed", type=int, default=0, help="the same seed gives the same scene (default: 0)")
+    group.add_argument(
+        "--device", default="auto", choices=DEVICES, help="where to fit (default: auto, CUDA if it works)"
+    )
+    group.add_argument("--weights", metavar="MASK", help="a picture that is bright where errors matter")
+    group.add_argument("--start", metavar="SCENE", help="a scene file to go on from, at any size")
+    group.add_argument("--palette", metavar="COLORS", help='the only colours there may be: "#123,#a0b1c2"')
+    group.add_argument("--colors", type=int, metavar="K", help="how many colours there may be")
+    group.add_argument("--min-area", type=float, metavar="SHARE", help="least area of a shape, of the canvas")
+    group.add_argument(
+        "--trials", type=int, default=0, metavar="T", help="try a few shapes elsewhere at the end, T times"
+    )
+
+
+SETTINGS = tuple(inspect.signature(settings_of).parameters)[1:]
+
+
+def _settings(options: argparse.Namespace) -> dict[str, Any]:
+    return {name: getattr(options, name) for name in SETTINGS} | {"kind": _kinds(options)}
 
 
 def _add_emit(parser: argparse.ArgumentParser, default: str) -> None:
@@ -159,12 +184,10 @@ def _convert(arguments: list[str]) -> int:
 
 def _check_settings(options: argparse.Namespace, targets: list[str]) -> None:
     """Refuses impossible settings, and targets that can't hold such a scene, before any work is done."""
-    api.check_settings(
-        options.shapes, _kinds(options), options.compositing, options.preset, options.loss, options.seed
-    )
+    compositing = settings_of(options.shapes, **_settings(options)).compositing
     Options(size=options.size, glsl=options.glsl, layout=options.layout)
     for target in targets:
-        api.export(Scene(1, 1, (), compositing=options.compositing), target)
+        api.export(Scene(1, 1, (), compositing=compositing), target)
 
 
 def _kinds(options: argparse.Namespace) -> list[str]:
@@ -202,17 +225,7 @@ def _fit(picture: Picture, options: argparse.Namespace, stop: _Stop) -> Scene:
             report(progress)
             return stop.requested
 
-        return api.fit(
-            picture,
-            options.shapes,
-            kind=_kinds(options),
-            compositing=options.compositing,
-            preset=options.preset,
-            loss=options.loss,
-            seed=options.seed,
-            device=options.device,
-            callback=callback,
-        )
+        return api.fit(picture, options.shapes, callback=callback, **_settings(options))
 
 
 def _read_picture(source: str) -> Picture:

@@ -16,6 +16,7 @@ import sdf2vec
 from sdf2vec import Layer, Scene, Sdf2vecError, Shape, api
 from sdf2vec.export import EXPORTERS
 from sdf2vec.fit.presets import PRESETS
+from sdf2vec.fit.settings import LOSS_NAMES, kinds_of, losses_of
 from sdf2vec.image import load
 
 if TYPE_CHECKING:
@@ -83,9 +84,9 @@ def test_settings_matter_and_defaults_are_said(levels):
 
 
 def test_names_of_kinds():
-    assert api.kinds_of("box") == ("box",)
-    assert api.kinds_of(["box", "circle", "box"]) == ("box", "circle")
-    assert api.kinds_of("mixed") == api.kinds_of(["box", "mixed"]) == tuple(sdf2vec.KINDS)
+    assert kinds_of("box") == ("box",)
+    assert kinds_of(["box", "circle", "box"]) == ("box", "circle")
+    assert kinds_of("mixed") == kinds_of(["box", "mixed"]) == tuple(sdf2vec.KINDS)
 
 
 def test_transparency_is_kept(levels):
@@ -285,13 +286,13 @@ def test_flip_of_a_large_picture_is_computed_on_a_smaller_one(monkeypatch):
     ],
 )
 def test_losses_and_their_weights(loss, expected):
-    assert api.losses_of(loss) == expected
+    assert losses_of(loss) == expected
 
 
 def test_every_loss_has_a_name_here():
     from sdf2vec.fit.losses import LOSSES
 
-    assert tuple(LOSSES) == api.LOSS_NAMES
+    assert tuple(LOSSES) == LOSS_NAMES
 
 
 def test_a_mixture_is_fitted(levels):

@@ -8,9 +8,10 @@ import torch
 
 import sdf2vec
 from sdf2vec.fit import constraints, loop, losses
-from sdf2vec.fit.loop import Progress, Settings, fit_picture, scaled
+from sdf2vec.fit.loop import Progress, fit_picture, scaled
 from sdf2vec.fit.placing import Layers, detail, place
 from sdf2vec.fit.presets import PRESETS, RATES, Start
+from sdf2vec.fit.settings import Settings
 from sdf2vec.image import Picture
 from sdf2vec.metrics import mse, psnr
 from sdf2vec.render import culled, device, triton_fused

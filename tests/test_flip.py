@@ -9,9 +9,10 @@ import torch
 
 from sdf2vec import flip as module
 from sdf2vec.fit.flip import Flip
-from sdf2vec.fit.loop import Settings, fit_picture
+from sdf2vec.fit.loop import fit_picture
 from sdf2vec.fit.losses import LOSSES
 from sdf2vec.fit.presets import PRESETS, Phase, Preset
+from sdf2vec.fit.settings import Settings
 from sdf2vec.flip import SMOOTH, Softness, appearance, error, flip, flip_map
 from sdf2vec.image import Picture, load, resize
 from sdf2vec.render.draw import draw

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterator
 from contextlib import suppress
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from functools import partial
 
 import numpy as np
@@ -17,13 +17,14 @@ from ..render import fused
 from ..render.device import Device, choose
 from ..render.fused import is_compiled, threads_of_its_own
 from ..render.tensors import Group, SceneTensors, from_scene, on_device, to_scene
-from ..scene import Color, Scene
+from ..scene import Scene
 from .constraints import project, too_small, widen
 from .growth import exchange, importance, least, newcomers
 from .losses import Objective, objective
 from .palette import found, snap
 from .placing import Layers, background_of, empty_groups, place
-from .presets import CROWDED, CROWDING, DEFAULT, LENGTHS, MANY, PRESETS, RATES, Loss, Phase, Preset, Start
+from .presets import CROWDED, CROWDING, LENGTHS, MANY, RATES, Phase, Start
+from .settings import Settings, preset_of, weights_for
 
 WIDEN_EVERY = 10  # steps
 AREA_WEIGHT = 1.0  # of the area constraint in the loss
@@ -31,37 +32,6 @@ TRIAL_LAYERS, TRIAL_STEPS, TRIAL_RATE = 4, 60, 0.5
 REFIT_STEPS = 100  # after the colours have been restricted
 ANYWHERE = Start("uniform")
 SAME_SHAPE = 0.01  # scene units by which a start scene's canvas may differ
-
-
-@dataclass(frozen=True)
-class Settings:
-    """What to fit and how.
-
-    `kinds`: names in `shapes.KINDS`; `union`: shapes joined in each layer; `loss`: replaces the preset's, when given;
-    `least_area`: of a shape, in shares of the canvas, None leaves it to the preset; `start`: a scene to go on from,
-    at any size; `trials`: how often a few layers are tried elsewhere at the end; `palette`: the only colours there
-    may be; `colors`: how many there may be where no palette is given, 0 for any; `weights`: how much an error
-    matters, 0..1, [H, W], of the picture's size; `device`: auto, cpu, cuda or mps.
-    """
-
-    shapes: int = 256
-    kinds: tuple[str, ...] = ("triangle",)
-    compositing: str = "over"
-    preset: str = DEFAULT
-    loss: Loss | None = None
-    seed: int = 0
-    device: str = "auto"
-    union: int = 1
-    least_area: float | None = None
-    start: Scene | None = None
-    trials: int = 0
-    palette: tuple[Color, ...] = ()
-    colors: int = 0
-    weights: np.ndarray | None = field(default=None, compare=False)
-
-    @property
-    def layers(self) -> Layers:
-        return Layers(self.kinds, self.compositing, self.union)
 
 
 @dataclass(frozen=True)
@@ -150,7 +120,7 @@ class Fit:
 
     def _start(self) -> SceneTensors:
         target = scaled(self.pixels, self._resolution(self.phases[0]))
-        settings, layers = self.settings, self.settings.layers
+        settings, layers = self.settings, _layers_of(self.settings)
         if settings.start is None:
             count = settings.shapes // settings.union
             return place(target, self.size, layers, count, self.preset.start, self.generator)
@@ -176,7 +146,7 @@ class Fit:
         elif spare < 0:
             count = -spare // self.settings.union
             everything = [torch.arange(len(group.order)) for group in tensors.groups]
-            fresh = newcomers(image, target, count, tensors, self.settings.layers, self.generator)
+            fresh = newcomers(image, target, count, tensors, _layers_of(self.settings), self.generator)
             exchange(tensors, optimizer, everything, fresh)
 
     def _announce_compiling(self) -> None:
@@ -188,7 +158,8 @@ class Fit:
         target = scaled(self.pixels, resolution).to(self.device.name)
         weights = None
         if self.settings.weights is not None:
-            weights = scaled(self.settings.weights[..., None], resolution)[0].to(self.device.name)
+            height, width = target.shape[1:]
+            weights = torch.from_numpy(weights_for(self.settings.weights, width, height)).to(self.device.name)
         return Stage(phase, target, weights, objective(phase.loss, target, weights))
 
     def _resolution(self, phase: Phase) -> float:
@@ -233,7 +204,9 @@ class Fit:
         loss = float(stage.measure(image).detach())
         count = min(TRIAL_LAYERS, self.tensors.layer_count)
         scores = importance(image, self.tensors, self.generator)
-        places = place(stage.target.cpu(), self.size, self.settings.layers, count, ANYWHERE, self.generator)
+        places = place(
+            stage.target.cpu(), self.size, _layers_of(self.settings), count, ANYWHERE, self.generator
+        )
         for group in places.groups:
             group.order += self.tensors.layer_count
         exchange(self.tensors, self.optimizer, least(scores, count), places.groups)
@@ -262,21 +235,13 @@ class Fit:
             return
         image = self._draw(self.tensors, stage.target)
         scores = importance(image, self.tensors, self.generator)
-        layers = self.settings.layers
+        layers = _layers_of(self.settings)
         fresh = newcomers(image, stage.target, count, self.tensors, layers, self.generator, stage.weights)
         exchange(self.tensors, self.optimizer, least(scores, count), fresh)
 
 
-def preset_of(settings: Settings) -> Preset:
-    """The preset with what the settings replace. Raises Sdf2vecError where it is for another compositing."""
-    preset = PRESETS[settings.preset]
-    if preset.compositing not in (None, settings.compositing):
-        raise Sdf2vecError(f"the preset {settings.preset} is for --compositing {preset.compositing}")
-    if settings.loss is not None:
-        preset = replace(preset, phases=tuple(replace(p, loss=settings.loss) for p in preset.phases))
-    if settings.least_area is not None:
-        preset = replace(preset, least_area=settings.least_area)
-    return preset
+def _layers_of(settings: Settings) -> Layers:
+    return Layers(settings.kinds, settings.compositing, settings.union)
 
 
 def _check_start(scene: Scene, size: tuple[float, float]) -> None:

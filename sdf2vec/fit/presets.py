@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from typing import Literal
 
@@ -83,7 +84,7 @@ class Preset:
         """A phase's resolution for so many shapes: what is drawn with many needs more pixels to tell them apart."""
         if not self.sharpens or phase.resolution < 1:
             return phase.resolution
-        return phase.resolution * max(1.0, shapes / MANY) ** 0.25
+        return phase.resolution * math.sqrt(math.sqrt(max(1.0, shapes / MANY)))
 
     @property
     def steps(self) -> int:
