@@ -5,6 +5,7 @@ What is decided is pure; `exchange` alone changes a scene, and Adam's state with
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from functools import partial
 
@@ -30,7 +31,7 @@ def importance(image: torch.Tensor, tensors: SceneTensors, generator: torch.Gene
         signs = torch.randint(0, 2, image.shape, generator=generator).float() * 2 - 1
         grads = torch.autograd.grad(image, leaves, signs.to(image.device), retain_graph=True)
         for total, leaf, grad in zip(totals, leaves, grads, strict=True):
-            change = (leaf.detach() * grad).reshape(len(leaf), -1).sum(1)
+            change = (leaf.detach() * grad).reshape(len(leaf), math.prod(leaf.shape[1:])).sum(1)
             total += change.square().cpu()
     return totals
 
