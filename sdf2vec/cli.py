@@ -257,7 +257,7 @@ def _figure(scene: Scene, target: str) -> str:
 
     if target not in ROUND_TRIPS:
         return ""
-    trip = ROUND_TRIPS[target]
+    trip = ROUND_TRIPS[target][0]
     try:
         result = api.check(scene, [target], default_sizes(scene, trip)[:1])[0]
     except Sdf2vecError as error:
