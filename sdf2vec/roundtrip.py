@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
@@ -62,7 +62,7 @@ class RoundTrip:
     engine: str
     draw: Callable[[str, int, int], Pixels]
     any_shape: bool = True
-    options: Options = Options()
+    options: Options = field(default_factory=Options)
     note: str = ""
 
     @property

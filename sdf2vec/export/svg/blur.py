@@ -12,6 +12,7 @@ from functools import lru_cache
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ...scene import Layer
 from ...shapes import KINDS, Outline
@@ -54,7 +55,7 @@ def best_blur(layer: Layer, size: tuple[int, int, float]) -> Blurred | None:
     outline = outline_of(0.5 * layer.falloff, *layer.shapes[0].named().values())
     if core(outline) is None:
         return None
-    trial = _Trial.of(layer, size)
+    trial = trial_of(layer, size)
     rounded = min((trial.blurred(sharpened(outline, share), 1.0) for share in SHARES), key=_error)
     widths = (trial.blurred(rounded.outline, width) for width in WIDTHS)
     return min(rounded, *widths, key=_error)
@@ -65,22 +66,14 @@ def _error(tried: Blurred) -> float:
 
 
 @dataclass(frozen=True)
-class _Trial:
+class Trial:
     """A layer's coverage on a grid, to compare blurs with; only what lies on the canvas counts."""
 
     falloff: float
     grid: Grid
     wanted: Array  # [Y, X]
-    seen: Array  # [Y, X] bool
+    seen: NDArray[np.bool_]  # [Y, X]
     unit: float
-
-    @classmethod
-    def of(cls, layer: Layer, size: tuple[int, int, float]) -> _Trial:
-        width, height, unit = size
-        box = extent(layer)
-        grid = grid_over(box, max(box.right - box.left, box.bottom - box.top) / CELLS)
-        across, down = np.abs(grid.x) < width / unit / 2, np.abs(grid.y) < height / unit / 2
-        return cls(layer.falloff, grid, covers(layer, grid, 1.0 / unit), down[:, None] & across[None, :], unit)
 
     def blurred(self, outline: Outline, width: float) -> Blurred:
         """The error of an outline whose blur is so many times as wide as the falloff asks for.
@@ -97,3 +90,13 @@ class _Trial:
         from scipy.ndimage import gaussian_filter
 
         return np.asarray(gaussian_filter(sharp, deviation / self.grid.step, mode="constant", truncate=3.5))
+
+
+def trial_of(layer: Layer, size: tuple[int, int, float]) -> Trial:
+    """What blurs of a layer are compared with; `size` as in `best_blur`."""
+    width, height, unit = size
+    box = extent(layer)
+    grid = grid_over(box, max(box.right - box.left, box.bottom - box.top) / CELLS)
+    across, down = np.abs(grid.x) < width / unit / 2, np.abs(grid.y) < height / unit / 2
+    seen = down[:, None] & across[None, :]
+    return Trial(layer.falloff, grid, covers(layer, grid, 1.0 / unit), seen, unit)

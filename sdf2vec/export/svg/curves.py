@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+from itertools import pairwise
+
 import numpy as np
 
 from .canvas import Canvas, Points
 
-CORNER = 0.5  # cosine of the angle beyond which a knot is a corner
 ROUNDS = 3  # of fitting a curve and moving its parameters to the nearest places
 
 
@@ -24,10 +25,21 @@ def _closed(contour: Points, tolerance: float, canvas: Canvas) -> str:
     if len(rough) < 4:
         return canvas.polygon_path(approximate_polygon(points, tolerance)[:-1])
     places = _places(points, rough)
-    parts = [f"M{canvas.joined(points[:1])}"]
-    for start, end in zip(places[:-1], places[1:], strict=True):
-        parts += _spans(points, start, end, tolerance, canvas)
-    return "".join(parts) + "Z"
+    commands: list[tuple[str, Points]] = []
+    for start, end in pairwise(places):
+        commands += _spans(points, start, end, tolerance)
+    return f"M{canvas.joined(points[:1])}{_relative(points[0], commands, canvas)}Z"
+
+
+def _relative(start: Points, commands: list[tuple[str, Points]], canvas: Canvas) -> str:
+    """Commands in coordinates relative to where each begins; rounding does not add up."""
+    here = canvas.rounded(start)
+    parts, last = [], ""
+    for command, points in commands:
+        written = canvas.rounded(points)
+        parts.append((command if command != last else " ") + canvas.joined(written - here))
+        here, last = written[-1], command
+    return "".join(parts)
 
 
 def _places(points: Points, knots: Points) -> list[int]:
@@ -37,16 +49,16 @@ def _places(points: Points, knots: Points) -> list[int]:
     return [0, *inner, len(points) - 1]
 
 
-def _spans(points: Points, start: int, end: int, tolerance: float, canvas: Canvas) -> list[str]:
+def _spans(points: Points, start: int, end: int, tolerance: float) -> list[tuple[str, Points]]:
     """Curve commands from one point of a contour to another; split where one curve does not follow it."""
     span = points[start : end + 1]
-    if end - start < 3:
-        return ["L" + canvas.joined(span[1:])]
+    if end - start < 4:
+        return [("l", span[-1:])]
     handles, worst, where = _fit(span)
-    if worst <= tolerance or end - start < 6:
-        return ["C" + canvas.joined(np.stack([*handles, span[-1]]))]
-    middle = start + min(max(where, 2), end - start - 2)
-    return [*_spans(points, start, middle, tolerance, canvas), *_spans(points, middle, end, tolerance, canvas)]
+    if worst <= tolerance or end - start < 8:
+        return [("c", np.stack([*handles, span[-1]]))]
+    middle = start + min(max(where, 3), end - start - 3)
+    return [*_spans(points, start, middle, tolerance), *_spans(points, middle, end, tolerance)]
 
 
 def _fit(span: Points) -> tuple[Points, float, int]:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from functools import cache
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,6 +15,9 @@ from ...expr import VEC2, VEC3, components_of, const, constant, scalarize, var
 from ...scene import Layer
 from ...shapes import KINDS
 from ..constants import constants
+
+if TYPE_CHECKING:
+    import torch
 
 Array = NDArray[np.float64]
 CHUNK = 1 << 15  # points computed at a time
@@ -58,7 +61,9 @@ def grid_over(box: Box, step: float) -> Grid:
     columns = max(1, math.ceil((box.right - box.left) / step))
     rows = max(1, math.ceil((box.bottom - box.top) / step))
     return Grid(
-        box.left + (np.arange(columns) + 0.5) * step, box.top + (np.arange(rows) + 0.5) * step, step
+        np.asarray(box.left + (np.arange(columns) + 0.5) * step, np.float64),
+        np.asarray(box.top + (np.arange(rows) + 0.5) * step, np.float64),
+        step,
     )
 
 
@@ -75,12 +80,12 @@ def extent(layer: Layer, falloffs: float = 0.5 + REACH) -> Box:
 
 def distances(layer: Layer, grid: Grid) -> Array:
     """Signed distances [Y, X] to a layer."""
-    return _evaluate(layer, grid, 0.0, 1)[0]
+    return np.asarray(_evaluate(layer, grid, 0.0, 1)[0])
 
 
 def covers(layer: Layer, grid: Grid, pixel: float) -> Array:
     """Coverage [Y, X] of a layer for pixels of a size in scene units."""
-    return _evaluate(layer, grid, pixel, 2)[1]
+    return np.asarray(_evaluate(layer, grid, pixel, 2)[1])
 
 
 def colors(layer: Layer, grid: Grid) -> Array:
@@ -110,7 +115,7 @@ def _evaluate(layer: Layer, grid: Grid, pixel: float, count: int) -> Array:
 
 
 @cache
-def _formula(kind: str, union_size: int, count: int) -> Callable[..., tuple]:
+def _formula(kind: str, union_size: int, count: int) -> Callable[..., tuple[torch.Tensor, ...]]:
     from ...lower.torch import compile_torch
 
     p, pixel, falloff, smoothness = var("p", VEC2), var("pixel"), var("falloff"), var("smoothness")
@@ -121,9 +126,5 @@ def _formula(kind: str, union_size: int, count: int) -> Callable[..., tuple]:
     inputs = [*components_of(p), pixel, falloff, smoothness]
     for suffix, own in zip(suffixes, colors, strict=True):
         inputs += [*KINDS[kind].scalars(suffix), *components_of(own)]
-    outputs = [distance, coverage(distance, falloff, pixel), *components_of_color(color)]
+    outputs = [distance, coverage(distance, falloff, pixel), *scalarize(color)]
     return compile_torch(outputs[:count], inputs)
-
-
-def components_of_color(color: object) -> list:
-    return list(scalarize(color))  # type: ignore[arg-type]

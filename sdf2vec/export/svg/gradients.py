@@ -18,7 +18,7 @@ import numpy as np
 from ...blend import REACH
 from ...scene import Color
 from ...shapes import EllipseOutline
-from .canvas import Canvas, Document, Points, color_text, opacity_text, tag, url
+from .canvas import Canvas, Document, Points, color_text, number, opacity_text, tag, url
 from .outlines import convex, sides, turn
 from .stops import SOFT, edge_stops, stop_elements
 
@@ -41,19 +41,23 @@ def ellipse(outline: EllipseOutline, paint: Paint, document: Document, name: str
     canvas = document.canvas
     shortest = min(outline.radii) * canvas.unit / paint.falloff  # in falloffs
     grown = 1.0 + SOFT / shortest
-    start = max(-shortest, 0.5 - REACH)
-    offsets = [((1.0 + d / shortest) / grown, c) for d, c in edge_stops(start, paint.stops)]
-    gradient = document.define("soft", "radialGradient", *stop_elements(offsets, color_text(paint.color)))
     ((x, y),) = canvas.places(outline.center).tolist()
     rx, ry = (radius * canvas.unit * grown for radius in outline.radii)
+    start = max(-shortest, 0.5 - REACH)
+    offsets = [((1.0 + d / shortest) / grown, c) for d, c in edge_stops(start, paint.stops)]
+    stops = stop_elements(offsets, color_text(paint.color))
+    look = {"opacity": opacity_text(paint.opacity), "style": paint.style}
     place = {"cx": canvas.number(x), "cy": canvas.number(y)}
-    look = {"fill": url(gradient), "opacity": opacity_text(paint.opacity), "style": paint.style}
     if canvas.number(rx) == canvas.number(ry):
-        return tag("circle", id=name, **place, r=canvas.number(rx), **look)
+        gradient = document.define("soft", "radialGradient", *stops)
+        return tag("circle", id=name, **place, r=canvas.number(rx), fill=url(gradient), **look)
+    # In user units, for librsvg mistakes gradients that are stretched with a turned element's box.
+    squeeze = f"translate({place['cx']} {place['cy']})scale(1 {number(ry / rx, 5)})"
+    own = {"gradientUnits": "userSpaceOnUse", "cx": "0", "cy": "0", "gradientTransform": squeeze}
+    gradient = document.define("soft", "radialGradient", *stops, r=canvas.number(rx), **own)
+    radii = {"rx": canvas.number(rx), "ry": canvas.number(ry)}
     turned = turn(outline.angle, x, y, canvas)
-    return tag(
-        "ellipse", id=name, **place, rx=canvas.number(rx), ry=canvas.number(ry), transform=turned, **look
-    )
+    return tag("ellipse", id=name, **place, **radii, transform=turned, fill=url(gradient), **look)
 
 
 def sliced(points: Points, rounding: float, paint: Paint, document: Document, name: str | None) -> str:
@@ -74,7 +78,7 @@ def sliced(points: Points, rounding: float, paint: Paint, document: Document, na
         if len(corners) > 1:
             start, end = outer[index - 1][1], outer[index][0]
         else:
-            start = end = corner + (reach, 0.0)
+            start = end = corner + np.array([reach, 0.0])
         parts += [_slice(p, radial[index], canvas) for p in _sectors(corner, start, end, reach, canvas)]
     look = {"opacity": opacity_text(paint.opacity), "style": paint.style}
     return tag("g", *parts, id=name, shape_rendering="crispEdges", **look)

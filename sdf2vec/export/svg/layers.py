@@ -8,7 +8,7 @@ import numpy as np
 
 from ...scene import Layer, Scene
 from ...shapes import KINDS, EllipseOutline, Outline
-from .bands import band_levels, layer_contours
+from .bands import band_count, band_levels, layer_contours
 from .blur import Blurred, best_blur
 from .canvas import Canvas, Document, opacity_text, tag, url
 from .curves import path_data
@@ -20,20 +20,21 @@ from .stops import stop_count
 from .weigh import contrasts
 
 SHARP = 2.0  # user units: an edge softer than this is drawn soft
-TOLERANCE = 0.07  # user units that a traced contour may be off
+SMALL = 64.0  # user units along the shortest side: a picture smaller than this will be shown larger
+BANDS_COARSER = 4.0  # bands are dear, and their steps alternate in sign
+TOLERANCE = 0.05  # user units that a traced contour may be off
 
 
 @dataclass(frozen=True)
 class Detail:
     """How finely a drawing is made. `target` is the nearness in dB for which blurs are given up.
 
-    `levels`: the error, in 8-bit levels, that the stops of one shape's edge may leave. `bands`: of a traced soft
-    edge. `coarser`: decimals fewer. `named`: ids on shapes.
+    `levels`: the error, in 8-bit levels, that the stops of one shape's edge may leave, and times
+    BANDS_COARSER the bands of a traced one. `coarser`: decimals fewer. `named`: ids on shapes.
     """
 
     target: float = 46.0
     levels: float = 0.2
-    bands: int = 12
     coarser: int = 0
     named: bool = True
 
@@ -61,7 +62,7 @@ class Painter:
         layer = part.layer
         name = self.document.id_of(layer.kind, part.index)
         outline = edge_of(layer, 0.5)
-        if layer.falloff * self.canvas.unit <= SHARP:
+        if not is_soft(layer, self.canvas):
             return self._sharp(part, outline, name)
         if part.index in self.plan.blurred:
             return self._blur(part, self.plan.blurred[part.index], name)
@@ -89,15 +90,15 @@ class Painter:
 
     def _bands(self, part: Part, name: str | None) -> str:
         layer = part.layer
-        bands = band_levels(self.detail.bands)
-        ends = [outer for outer, _, _ in bands]
-        found = layer_contours(layer, [end * layer.falloff for end in ends], self.canvas)
-        traced = [path_data(contours, TOLERANCE, self.canvas) for contours in found] + [""]
-        paths = [
-            tag("path", d=traced[i] + traced[i + 1], fill_opacity=opacity_text(cover))
-            for i, (_, _, cover) in enumerate(bands)
-            if traced[i]
-        ]
+        bands = band_levels(self.plan.bands[part.index])
+        tolerance = max(TOLERANCE, 0.15 * layer.falloff * self.canvas.unit / len(bands))
+        found = layer_contours(layer, [end * layer.falloff for end, _ in bands], self.canvas)
+        paths, below = [], 0.0
+        for contours, (_, cover) in zip(found, bands, strict=True):
+            if contours:
+                added = opacity_text((cover - below) / (1.0 - below))
+                paths.append(tag("path", d=path_data(contours, tolerance, self.canvas), fill_opacity=added))
+            below = cover
         if not paths:
             return ""
         look = {
@@ -105,7 +106,7 @@ class Painter:
             "opacity": opacity_text(layer.opacity),
             "style": part.style,
         }
-        return tag("g", *paths, id=name, shape_rendering="crispEdges", fill_rule="evenodd", **look)
+        return tag("g", *paths, id=name, fill_rule="evenodd", **look)
 
     def _blur(self, part: Part, blurred: Blurred, name: str | None) -> str:
         look = {
@@ -144,6 +145,11 @@ class Painter:
         }
 
 
+def is_soft(layer: Layer, canvas: Canvas) -> bool:
+    """Whether a layer's edge is too soft for antialiasing to draw it."""
+    return layer.falloff * canvas.unit > SHARP * min(1.0, canvas.unit / SMALL)
+
+
 def _at_least(share: float) -> int:
     """Per cent, rounded up to one of a few steps."""
     steps = (10, 20, 30, 45, 60, 80, 110, 150, 200, 300, 450, 700, 1000, 2000, 5000)
@@ -160,23 +166,25 @@ def edge_of(layer: Layer, falloffs: float) -> Outline | None:
 
 @dataclass(frozen=True)
 class Plan:
-    """Which layers are drawn by a blur, and how many stops the gradients of each layer have."""
+    """Which layers are drawn by a blur, how many stops the gradients of each layer have, and how many bands."""
 
     blurred: dict[int, Blurred]
     stops: list[int]
+    bands: list[int]
 
 
 def plan(scene: Scene, canvas: Canvas, detail: Detail, blurs: bool) -> Plan:
     """The cheapest constructions that keep to what is allowed."""
     weight = contrasts(scene) if scene.layers else np.zeros(0)
     stops = [stop_count(w, detail.levels) for w in weight.tolist()]
-    return Plan(_choose_blurs(scene, canvas, weight, detail.target) if blurs else {}, stops)
+    bands = [band_count(w, BANDS_COARSER * detail.levels) for w in weight.tolist()]
+    return Plan(_choose_blurs(scene, canvas, weight, detail.target) if blurs else {}, stops, bands)
 
 
 def _choose_blurs(scene: Scene, canvas: Canvas, weight: Array, target: float) -> dict[int, Blurred]:
     """All layers that have a blur but the worst, which are given up until the target is reached."""
     size = (canvas.width, canvas.height, canvas.unit)
-    soft = {i: layer for i, layer in enumerate(scene.layers) if layer.falloff * canvas.unit > SHARP}
+    soft = {i: layer for i, layer in enumerate(scene.layers) if is_soft(layer, canvas)}
     tried = {index: best_blur(layer, size) for index, layer in soft.items()}
     found = {index: blurred for index, blurred in tried.items() if blurred is not None}
     energy = {index: blurred.error * float(weight[index]) for index, blurred in found.items()}

@@ -158,7 +158,7 @@ def distance_to(outline: Outline, grid: Grid) -> Array:
     x, y = grid.x[None, :], grid.y[:, None]
     corners = convex(points)
     if len(corners) == 1:
-        return np.hypot(x - corners[0, 0], y - corners[0, 1]) - rounding
+        return np.asarray(np.hypot(x - corners[0, 0], y - corners[0, 1])) - rounding
     nearest = np.full((len(grid.y), len(grid.x)), np.inf)
     inside = np.full(nearest.shape, len(corners) > 2)
     for a, b, normal in sides(corners):
@@ -167,4 +167,4 @@ def distance_to(outline: Outline, grid: Grid) -> Array:
         along = np.clip((px * edge[0] + py * edge[1]) / max(float(edge @ edge), FLAT**2), 0.0, 1.0)
         nearest = np.minimum(nearest, np.hypot(px - along * edge[0], py - along * edge[1]))
         inside &= px * normal[0] + py * normal[1] <= 0.0
-    return np.where(inside, -nearest, nearest) - rounding
+    return np.asarray(np.where(inside, -nearest, nearest)) - rounding

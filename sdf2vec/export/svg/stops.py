@@ -54,7 +54,8 @@ def stop_count(contrast: float, levels: float) -> int:
 def stops_error(count: int) -> float:
     """Root mean square error of coverage along an edge drawn with so many stops."""
     x = np.linspace(0.0, SOFT, 1001)
-    drawn = np.interp(x, *zip(*edge_stops(0.0, count), strict=True))
+    places, values = np.array(edge_stops(0.0, count)).T
+    drawn = np.interp(x, places, values)
     return float(np.sqrt(np.mean((drawn - edge_profile(x)) ** 2)))
 
 

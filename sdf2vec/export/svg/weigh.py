@@ -24,7 +24,7 @@ def contrasts(scene: Scene) -> Array:
     soft = covers * (1.0 - covers) + 1e-3 * covers + 1e-9
     if scene.compositing == "additive":
         change = np.square(colors).mean(axis=1)
-        return np.sum(soft * change, axis=1) / soft.sum(axis=1)
+        return np.asarray(np.sum(soft * change, axis=1) / soft.sum(axis=1))
     opacity = np.array([layer.opacity for layer in scene.layers])[:, None]
     alphas = covers * opacity
     hidden = np.ones_like(alphas)
