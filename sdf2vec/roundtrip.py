@@ -117,6 +117,15 @@ def _check_trip(scene: Scene, trip: RoundTrip, sizes: Sequence[Size]) -> list[Ch
         return [Check(trip.name, trip.engine, missing=str(error))]
 
 
+def figure(scene: Scene, target: str, data: str | bytes, options: Options) -> Check | None:
+    """An export at the fitted size on the first engine that draws it; None where none is here."""
+    for trip in ROUND_TRIPS.get(target, ()):
+        suits = trip.target != "svg" or trip.options.svg_profile == options.svg_profile
+        if suits and isinstance(data, str) and not ENGINES[trip.engine].missing():
+            return compare(trip, data, scene, default_sizes(scene, trip)[0])
+    return None
+
+
 def compare(trip: RoundTrip, text: str, scene: Scene, size: Size) -> Check:
     """One export drawn at one size, against the torch render in float64."""
     import torch

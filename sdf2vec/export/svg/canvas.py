@@ -74,9 +74,9 @@ def number(value: float, digits: int) -> str:
     return text.replace("0.", ".", 1) if text.startswith(("0.", "-0.")) else text
 
 
-def color_text(color: Sequence[float]) -> str:
-    """A colour 0..1 as hexadecimal digits, the short form where it says the same."""
-    pairs = [f"{round(255 * min(max(channel, 0.0), 1.0)):02x}" for channel in color]
+def color_text(color: Sequence[float], lift: float = 0.0) -> str:
+    """A colour 0..1 as hexadecimal digits, the short form where it says the same; `lift` is in 8-bit levels."""
+    pairs = [f"{round(min(max(255 * channel + lift, 0.0), 255.0)):02x}" for channel in color]
     if all(pair[0] == pair[1] for pair in pairs):
         pairs = [pair[0] for pair in pairs]
     return "#" + "".join(pairs)
@@ -94,10 +94,14 @@ def tag(name: str, *children: str, **attributes: str | None) -> str:
 
 @dataclass
 class Document:
-    """The growing drawing: definitions, each written once however often it is used, and the body."""
+    """The growing drawing: definitions, each written once however often it is used, and the body.
+
+    `lift`: levels of 8 bits that layers' colours are raised by on average, against what renderers round down.
+    """
 
     canvas: Canvas
     named: bool = True
+    lift: float = 0.0
     definitions: dict[str, str] = field(default_factory=dict)
     body: list[str] = field(default_factory=list)
 
@@ -107,6 +111,10 @@ class Document:
         if content not in self.definitions:
             self.definitions[content] = f"{ID_MARK}{kind}{len(self.definitions) + 1}"
         return self.definitions[content]
+
+    def color(self, color: Sequence[float]) -> str:
+        """A layer's colour as it is written."""
+        return color_text(color, self.lift)
 
     def id_of(self, kind: str, index: int) -> str | None:
         """The readable id of a shape's element."""

@@ -18,7 +18,7 @@ import numpy as np
 from ...blend import REACH
 from ...scene import Color
 from ...shapes import EllipseOutline
-from .canvas import Canvas, Document, Points, color_text, number, opacity_text, tag, url
+from .canvas import Canvas, Document, Points, number, opacity_text, tag, url
 from .outlines import convex, sides, turn
 from .stops import SOFT, edge_stops, stop_elements
 
@@ -45,7 +45,7 @@ def ellipse(outline: EllipseOutline, paint: Paint, document: Document, name: str
     rx, ry = (radius * canvas.unit * grown for radius in outline.radii)
     start = max(-shortest, 0.5 - REACH)
     offsets = [((1.0 + d / shortest) / grown, c) for d, c in edge_stops(start, paint.stops)]
-    stops = stop_elements(offsets, color_text(paint.color))
+    stops = stop_elements(offsets, document.color(paint.color))
     look = {"opacity": opacity_text(paint.opacity), "style": paint.style}
     place = {"cx": canvas.number(x), "cy": canvas.number(y)}
     if canvas.number(rx) == canvas.number(ry):
@@ -66,7 +66,7 @@ def sliced(points: Points, rounding: float, paint: Paint, document: Document, na
     corners = canvas.rounded(convex(points))
     corners = convex(corners)
     reach = rounding + SOFT * paint.falloff
-    stops = _offsets(rounding, reach, paint)
+    stops = stop_elements(_offsets(rounding, reach, paint), document.color(paint.color))
     parts = []
     outer = [canvas.rounded(np.stack([a, b]) + normal * reach) for a, b, normal in sides(corners)]
     for index, (a, b, normal) in enumerate(sides(corners)):
@@ -84,12 +84,11 @@ def sliced(points: Points, rounding: float, paint: Paint, document: Document, na
     return tag("g", *parts, id=name, shape_rendering="crispEdges", **look)
 
 
-def _offsets(rounding: float, reach: float, paint: Paint) -> list[str]:
-    """Stops from the polygon's side to where coverage ends."""
+def _offsets(rounding: float, reach: float, paint: Paint) -> list[tuple[float, float]]:
+    """Offset and coverage of stops from the polygon's side to where coverage ends."""
     start = max(-rounding / paint.falloff, 0.5 - REACH) if rounding > 0 else 0.0
     pairs = edge_stops(start, paint.stops)
-    offsets = [((d * paint.falloff + rounding) / reach, c) for d, c in pairs]
-    return stop_elements(offsets, color_text(paint.color))
+    return [((d * paint.falloff + rounding) / reach, c) for d, c in pairs]
 
 
 def _slice(points: Points, gradient: str, canvas: Canvas) -> str:

@@ -6,7 +6,7 @@ import numpy as np
 
 from ...scene import Layer
 from .bands import seen
-from .canvas import Document, color_text, mean_color, number, tag, url
+from .canvas import Document, mean_color, number, tag, url
 from .field import Array, colors, covers, grid_over
 
 STOPS = 7
@@ -18,12 +18,12 @@ def fill_of(layer: Layer, document: Document) -> str:
     """A colour, or a gradient along the direction in which the union's colour changes most."""
     own = np.array([shape.color for shape in layer.shapes])
     if np.ptp(own, axis=0).max() <= SAME:
-        return color_text(mean_color([shape.color for shape in layer.shapes]))
+        return document.color(mean_color([shape.color for shape in layer.shapes]))
     box = seen(layer, document.canvas)
     grid = grid_over(box, max(box.right - box.left, box.bottom - box.top) / CELLS)
     weight = covers(layer, grid, 1.0 / document.canvas.unit).ravel() * layer_weight(layer)
     if weight.max() < 1e-3:
-        return color_text(mean_color([shape.color for shape in layer.shapes]))
+        return document.color(mean_color([shape.color for shape in layer.shapes]))
     places = np.stack([v.ravel() for v in np.meshgrid(grid.x, grid.y)], axis=1)
     return url(_gradient(places, colors(layer, grid).reshape(3, -1).T, weight, document))
 
@@ -52,7 +52,7 @@ def _gradient(places: Array, wanted: Array, weight: Array, document: Document) -
         stacked, np.concatenate([wanted * root, ridge @ np.tile(mean, (STOPS, 1))]), rcond=None
     )
     stops = [
-        tag("stop", offset=number(i / (STOPS - 1), 3), stop_color=color_text(value))
+        tag("stop", offset=number(i / (STOPS - 1), 3), stop_color=document.color(value))
         for i, value in enumerate(values.tolist())
     ]
     (x1, y1), (x2, y2) = canvas.places(middle + np.outer(knots[[0, -1]], direction)).tolist()
