@@ -131,12 +131,12 @@ def test_half_a_pixel_is_seen(target, require_engine):
 
 
 def test_check_reports_every_target_at_three_sizes(require_engine):
-    for engine in ("opengl", "webgpu", "resvg"):
+    for engine in ENGINES:
         require_engine(engine)
     results = sdf2vec.check(random_scene(seed=9, layers=4))
-    assert {result.target for result in results} == {"glsl", "shadertoy", "wgsl", "svg"}
-    assert all(result.verdict == "same" for result in results if result.target != "svg")
-    assert len(results) == 12
+    assert {result.target for result in results} == {"glsl", "shadertoy", "wgsl", "svg", "svg portable"}
+    assert all(result.verdict == "same" for result in results if "svg" not in result.target)
+    assert len(results) == 3 * sum(map(len, ROUND_TRIPS.values()))
 
 
 def test_check_says_what_is_missing(monkeypatch):

@@ -1,6 +1,8 @@
 """SVG: well-formed by an independent parser, and the render's picture when resvg draws it."""
 
+import base64
 import math
+import random
 import re
 from xml.etree import ElementTree
 
@@ -10,15 +12,16 @@ import torch
 from skimage.morphology import dilation, footprint_rectangle
 
 from sdf2vec import KINDS, Layer, Scene, Sdf2vecError, Shape
-from sdf2vec.engines import ENGINES
+from sdf2vec.engines import ENGINES, chromium
 from sdf2vec.export.options import Options
+from sdf2vec.export.svg import data_uri, notes, pdf
 from sdf2vec.export.svg import svg as write_svg
 from sdf2vec.export.svg.blur import best_blur, trial_of
 from sdf2vec.export.svg.layers import edge_of
 from sdf2vec.image import premultiply
 from sdf2vec.render.reference import render
 
-from .scenes import random_scene
+from .scenes import random_scene, random_shape
 
 NAMESPACE = "{http://www.w3.org/2000/svg}"
 Parameters = dict[str, float | tuple[float, ...]]
@@ -142,9 +145,39 @@ def test_layers_come_in_draw_order():
     assert fills == [f"#{i:x}00" for i in range(16)]
 
 
-def test_additive_is_refused_in_one_line():
-    with pytest.raises(Sdf2vecError, match=r"^svg: additive scenes .* --compositing over$"):
-        text_of(Scene(3, 2, (), compositing="additive"))
+def test_additive_where_nothing_can_be_added_is_refused_in_one_line():
+    with pytest.raises(Sdf2vecError, match=r"^svg: without blend modes .* --compositing over$"):
+        text_of(Scene(3, 2, (), compositing="additive"), svg_profile="portable")
+    with pytest.raises(Sdf2vecError, match=r"^svg: additive scenes on a transparent ground .*$"):
+        text_of(Scene(3, 2, (), None, compositing="additive"))
+
+
+def test_portable_has_neither_filters_nor_blend_modes():
+    text = text_of(random_scene(layers=20, seed=4), svg_profile="portable")
+    assert not re.search(r"<filter|filter=|<mask|<style|mix-blend-mode", text)
+
+
+def test_a_size_limit_is_kept_or_refused():
+    scene = random_scene(("box", "triangle"), layers=40, seed=7, unions={})
+    free = len(text_of(scene).encode())
+    assert len(text_of(scene, svg_size_limit=free).encode()) == free
+    limited = text_of(scene, svg_size_limit=free // 2)
+    assert len(limited.encode()) <= free // 2
+    assert any("drawn coarser" in note for note in notes(scene, Options(svg_size_limit=free // 2)))
+    with pytest.raises(Sdf2vecError, match=r"^svg: [\d,]+ bytes at least, more than the limit of 500"):
+        text_of(scene, svg_size_limit=500)
+
+
+def test_a_data_uri_holds_the_svg():
+    scene = random_scene(layers=3, seed=4)
+    head, _, body = data_uri(scene, Options()).partition(",")
+    assert head == "data:image/svg+xml;base64"
+    assert base64.b64decode(body).decode() == text_of(scene)
+
+
+def test_a_pdf_of_the_portable_profile(require_engine):
+    require_engine("cairosvg")
+    assert pdf(random_scene(layers=6, seed=4), Options()).startswith(b"%PDF-")
 
 
 def test_all_numbers_are_finite_and_plain():
@@ -377,3 +410,85 @@ def test_smaller_than_any_pixel():
     for falloff in (0.0, 0.1, 64.0):
         root = parsed(scene_of(Layer((shape,), falloff), width=1, height=1))
         assert drawn_in(root)
+
+
+# --- as every renderer draws it ----------------------------------------------------------------------------
+
+FILTERS = ("resvg", "librsvg", "chromium", "firefox")
+SIZES = [(150, 100), (300, 200), (260, 110)]  # fitted, twice, and neither that size nor that shape
+
+
+def off_in(engine, scene, profile, size):
+    """Signed differences in levels of 255, [H, W, 4]; beyond the drawing's edges nothing is compared."""
+    drawn = premultiply(ENGINES[engine].render(text_of(scene, svg_profile=profile), *size))
+    width, height = size
+    scale = min(width / scene.width, height / scene.height)
+    across, down = (round((n - m * scale) / 2) for n, m in ((width, scene.width), (height, scene.height)))
+    expected = render(scene, width, height, dtype=torch.float64).permute(1, 2, 0).numpy()
+    inner = np.s_[down : height - down, across : width - across]
+    return 255 * (drawn - expected)[inner]
+
+
+def soft_scene(compositing="over", background=(0.3, 0.4, 0.5)):
+    """Twelve soft shapes of all kinds, little and much contrast, some translucent."""
+    r = random.Random(3)
+    layers = []
+    for index in range(12):
+        shape = random_shape(sorted(KINDS)[index % 5], r)
+        if compositing == "additive":
+            sign = (-1) ** index * 0.25
+            shape = Shape(shape.kind, shape.parameters, tuple(sign * c for c in shape.color))
+        layers.append(Layer((shape,), r.uniform(0.05, 0.4), r.uniform(0.3, 1.0)))
+    return Scene(150, 100, tuple(layers), background, compositing)
+
+
+@pytest.mark.parametrize(
+    ("engine", "profile"),
+    [*((engine, "filters") for engine in FILTERS), *((e, "portable") for e in (*FILTERS, "cairosvg"))],
+)
+@pytest.mark.parametrize("background", [(0.3, 0.4, 0.5), None], ids=["opaque", "transparent"])
+def test_every_renderer_draws_the_same(require_engine, engine, profile, background):
+    require_engine(engine)
+    scene = soft_scene(background=background)
+    for size in SIZES if engine != "firefox" else SIZES[:1]:
+        off = off_in(engine, scene, profile, size)
+        assert 10 * math.log10(255**2 / np.mean(off**2)) > 40, size
+        assert abs(off.mean()) < 0.7, size
+
+
+@pytest.mark.parametrize("engine", FILTERS)
+def test_sums_in_every_renderer_that_can_add(require_engine, engine):
+    require_engine(engine)
+    scene = soft_scene("additive")
+    off = off_in(engine, scene, "filters", (300, 200))
+    assert 10 * math.log10(255**2 / np.mean(off**2)) > 38
+    assert abs(off.mean()) < 1
+
+
+def test_sums_leave_the_range_neither_above_nor_below(levels_off):
+    """1 + 1 − 1: in that order it would be cut off at 1 and end at 0."""
+    layers = [circle(0, 0, 0.3, (c, c, c), falloff=0.1) for c in (0.8, 0.8, -0.8)]
+    scene = Scene(150, 100, tuple(layers), BLACK, "additive")
+    assert levels_off(scene).max() <= 6
+    assert notes(scene, Options()) == ()
+
+
+def test_two_drawings_in_one_page_do_not_disturb_each_other(require_engine):
+    """Inline or as <img>, alone, twice, or with another that has the same kinds of definitions: equal pixels.
+
+    Compared at one place of the page, for browsers dither gradients by place.
+    """
+    require_engine("chromium")
+    one, other = text_of(soft_scene()), text_of(soft_scene(background=(0.9, 0.1, 0.1)))
+    image = '<img src="one.svg">'
+
+    def second_in(*drawings):
+        style = "<style>*{margin:0}svg,img{display:block}</style>"
+        page = f"<!DOCTYPE html>{style}{''.join(drawings)}"
+        with chromium.opened({"index.html": page, "one.svg": one}, 150, 300) as opened:
+            return chromium.screenshot(opened)[100:200]
+
+    alone = second_in(other, one)
+    assert np.abs(alone - second_in(one, other)).max() > 0.2
+    for drawings in ((one, one), (image, image, image), (one, image, one), (other, image, other)):
+        np.testing.assert_array_equal(second_in(*drawings), alone)

@@ -4,15 +4,19 @@ from __future__ import annotations
 
 import base64
 import math
+import re
 from dataclasses import replace
 from functools import lru_cache
 from typing import NamedTuple
+
+import numpy as np
 
 from ...errors import Sdf2vecError
 from ...files import one_line
 from ...scene import Scene
 from ..options import Options
 from .canvas import Canvas, Document, color_text, tag
+from .field import extent
 from .layers import Detail, Painter, Part, plan
 from .sums import Term, alternating, terms
 
@@ -21,6 +25,7 @@ LIFTS = {
     "filters": 0.4,
     PORTABLE: 0.2,
 }  # levels; what renderers lose, from none (resvg) to twice that (browsers)
+CREATED = re.compile(rb"(/CreationDate \(D:)([^)]*)")
 DIFFERENCE = "mix-blend-mode:difference"
 
 # From what looks like the render to what is small. Names go last, for they are what a person edits by.
@@ -69,7 +74,8 @@ def pdf(scene: Scene, options: Options) -> bytes:
         import cairosvg
     except OSError:  # the package is there, the system's library is not
         raise Sdf2vecError("pdf: needs cairo: apt-get install libcairo2") from None
-    return bytes(cairosvg.svg2pdf(bytestring=text.encode()))
+    made = bytes(cairosvg.svg2pdf(bytestring=text.encode()))
+    return CREATED.sub(lambda found: found[1] + b"0" * len(found[2]), made)  # the same scene, the same file
 
 
 def _written(scene: Scene, options: Options) -> Written:
@@ -127,7 +133,8 @@ def _add_terms(scene: Scene, document: Document, painter: Painter) -> tuple[str,
     ordered, lost = terms(scene) if scene.layers else ([], 0.0)
 
     def draw(term: Term) -> str:
-        return painter.draw(Part(term.layer, term.layer_index, DIFFERENCE))
+        drawn = painter.draw(Part(term.layer, term.layer_index))
+        return tag("g", _ground(term, document.canvas), drawn, style=DIFFERENCE) if drawn else ""
 
     inversion = tag("rect", width="100%", height="100%", fill="#fff", style=DIFFERENCE)
     document.body += [element for element in alternating(ordered, draw, inversion) if element]
@@ -135,3 +142,13 @@ def _add_terms(scene: Scene, document: Document, painter: Painter) -> tuple[str,
         return ()
     decibels = -20.0 * math.log10(lost)
     return (f"svg: sums leave the range of colours on the way and are cut off: {decibels:.0f} dB at most",)
+
+
+def _ground(term: Term, canvas: Canvas) -> str:
+    """Black below a term, which changes nothing; without it a translucent edge would not be subtracted in full."""
+    box = extent(term.layer).grown(2.0 / canvas.unit)
+    (left, top), (right, bottom) = np.clip(
+        canvas.places([box[:2], box[2:]]), (0.0, 0.0), (canvas.width, canvas.height)
+    ).tolist()
+    place = {"x": canvas.number(left), "y": canvas.number(top)}
+    return tag("rect", **place, width=canvas.number(right - left), height=canvas.number(bottom - top))

@@ -27,13 +27,12 @@ WIDEST = math.radians(60.0)  # of a circular sector drawn as a triangle
 
 @dataclass(frozen=True)
 class Paint:
-    """What an element is painted with: colour, opacity, a falloff in user units, attributes of its blending."""
+    """What an element is painted with: colour, opacity, a falloff in user units."""
 
     color: Color
     opacity: float
     falloff: float
     stops: int = 12
-    style: str | None = None
 
 
 def ellipse(outline: EllipseOutline, paint: Paint, document: Document, name: str | None) -> str:
@@ -46,7 +45,7 @@ def ellipse(outline: EllipseOutline, paint: Paint, document: Document, name: str
     start = max(-shortest, 0.5 - REACH)
     offsets = [((1.0 + d / shortest) / grown, c) for d, c in edge_stops(start, paint.stops)]
     stops = stop_elements(offsets, document.color(paint.color))
-    look = {"opacity": opacity_text(paint.opacity), "style": paint.style}
+    look = {"opacity": opacity_text(paint.opacity)}
     place = {"cx": canvas.number(x), "cy": canvas.number(y)}
     if canvas.number(rx) == canvas.number(ry):
         gradient = document.define("soft", "radialGradient", *stops)
@@ -80,7 +79,7 @@ def sliced(points: Points, rounding: float, paint: Paint, document: Document, na
         else:
             start = end = corner + np.array([reach, 0.0])
         parts += [_slice(p, radial[index], canvas) for p in _sectors(corner, start, end, reach, canvas)]
-    look = {"opacity": opacity_text(paint.opacity), "style": paint.style}
+    look = {"opacity": opacity_text(paint.opacity)}
     return tag("g", *parts, id=name, shape_rendering="crispEdges", **look)
 
 

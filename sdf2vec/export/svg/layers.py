@@ -41,11 +41,10 @@ class Detail:
 
 @dataclass(frozen=True)
 class Part:
-    """A layer to draw, with the colour and opacity that it has in this drawing, and its place in the scene."""
+    """A layer to draw and its place in the scene."""
 
     layer: Layer
     index: int
-    style: str | None = None
 
 
 class Painter:
@@ -81,7 +80,7 @@ class Painter:
         layer, unit = part.layer, self.canvas.unit
         edge = edge_of(layer, 0.0)
         color = layer.shapes[0].color
-        paint = Paint(color, layer.opacity, layer.falloff * unit, self.plan.stops[part.index], part.style)
+        paint = Paint(color, layer.opacity, layer.falloff * unit, self.plan.stops[part.index])
         if isinstance(edge, EllipseOutline):
             return ellipse(edge, paint, self.document, name)
         if edge is not None and (made := core(edge)) is not None:
@@ -104,7 +103,6 @@ class Painter:
         look = {
             "fill": fill_of(layer, self.document),
             "opacity": opacity_text(layer.opacity),
-            "style": part.style,
         }
         return tag("g", *paths, id=name, fill_rule="evenodd", **look)
 
@@ -113,7 +111,6 @@ class Painter:
             "fill": fill_of(part.layer, self.document),
             "opacity": opacity_text(part.layer.opacity),  # as the paint's, Chromium would round it down
             "filter": url(self._filter(part.layer, blurred)),
-            "style": part.style,
         }
         return element(blurred.outline, self.canvas, id=name, **look)
 
@@ -141,7 +138,6 @@ class Painter:
         return {
             "fill": fill_of(part.layer, self.document),
             "fill_opacity": opacity_text(part.layer.opacity),
-            "style": part.style,
         }
 
 

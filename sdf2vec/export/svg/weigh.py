@@ -3,10 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
-import torch
 
-from ...render.reference import canvas, group_coverage
-from ...render.tensors import from_scene
 from ...scene import Scene
 from .field import Array
 
@@ -45,6 +42,11 @@ def contrasts(scene: Scene) -> Array:
 
 def layers_at(scene: Scene, side: int) -> tuple[Array, Array]:
     """Coverage [N, P] and colour [N, 3, P or 1] of all layers on a small canvas of the scene's shape."""
+    import torch
+
+    from ...render.reference import canvas, group_coverage
+    from ...render.tensors import from_scene
+
     shortest = min(scene.width, scene.height)
     most = (MOST / max(1, len(scene.layers)) * shortest**2 / (scene.width * scene.height)) ** 0.5
     scale = min(side, max(8, int(most)), shortest) / shortest
