@@ -15,9 +15,9 @@ TORCH ?= torch==2.13.0
 BIN := $(VENV)/bin
 PIP := $(BIN)/python -m pip --disable-pip-version-check
 
-# Software OpenGL and Vulkan, Khronos' GLSL compiler, and cairo for the PDF export.
+# Software OpenGL and Vulkan, Khronos' GLSL compiler, cairo for the PDF export, librsvg and two browsers.
 ENGINES := libegl1 libegl-mesa0 libgl1 libgl1-mesa-dri libgbm1 libgles2 mesa-vulkan-drivers libvulkan1 \
-           glslang-tools libcairo2
+           glslang-tools libcairo2 librsvg2-bin chromium firefox-esr
 
 .DEFAULT_GOAL := demo
 .PHONY: demo test bench lint format engines clean distclean

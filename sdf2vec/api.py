@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Sequence
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
@@ -62,11 +63,17 @@ def render(scene: Scene, width: int | None = None, height: int | None = None) ->
 
 
 def export(scene: Scene, target: str, **options: Any) -> str | bytes:
-    """The scene as "glsl", "shadertoy", "wgsl", "svg", "json" (text) or "png" (bytes).
+    """The scene as "glsl", "shadertoy", "wgsl", "svg", "data-uri", "json" (text), "png" or "pdf" (bytes).
 
-    Options: `size`, `glsl`, `layout`, `title`, as in `sdf2vec.export.options.Options`. Raises Sdf2vecError.
+    Options: `size`, `glsl`, `layout`, `title`, `svg_profile`, `svg_size_limit`, as in
+    `sdf2vec.export.options.Options`. Raises Sdf2vecError.
     """
     return _export(scene, target, Options(**options))
+
+
+def check_export(scene: Scene, target: str, options: Options) -> None:
+    """Raises Sdf2vecError for a target that can't hold a scene of this sort, before there is one."""
+    _export(scene, target, replace(options, svg_size_limit=None))
 
 
 def check(

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import gzip
 import inspect
 import signal
 import sys
@@ -16,8 +17,8 @@ from typing import TYPE_CHECKING, Any, BinaryIO, Literal, NoReturn
 
 from . import __version__, api
 from .errors import Sdf2vecError
-from .export import EXPORTERS
-from .export.options import GLSL_VERSIONS, LAYOUTS, Options
+from .export import EXPORTERS, export
+from .export.options import GLSL_VERSIONS, LAYOUTS, SVG_PROFILES, Options
 from .files import one_line, require_writable, write_atomically
 from .fit.presets import DEFAULT, PRESETS
 from .fit.settings import DEVICES, LOSS_NAMES, settings_of
@@ -151,6 +152,20 @@ def _add_options(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--size", type=int, metavar="PIXELS", help="shortest side of a PNG")
     parser.add_argument("--glsl", default="es300", help=f"GLSL version: {', '.join(GLSL_VERSIONS)}")
     parser.add_argument("--layout", default="auto", help=f"how shaders hold shapes: {', '.join(LAYOUTS)}")
+    parser.add_argument(
+        "--svg-profile",
+        default=SVG_PROFILES[0],
+        help=f"{' or '.join(SVG_PROFILES)}: with blur filters (default), or without, for every renderer",
+    )
+    parser.add_argument(
+        "--svg-size-limit", type=int, metavar="BYTES", help="draw an SVG coarser where it would be larger"
+    )
+
+
+def _export_options(options: argparse.Namespace, title: str = "a picture") -> Options:
+    """What the user chose about exports. Raises Sdf2vecError for impossible choices."""
+    names = ("size", "glsl", "layout", "svg_profile", "svg_size_limit")
+    return Options(title=title, **{name: getattr(options, name) for name in names if hasattr(options, name)})
 
 
 @dataclass(frozen=True)
@@ -185,9 +200,9 @@ def _convert(arguments: list[str]) -> int:
 def _check_settings(options: argparse.Namespace, targets: list[str]) -> None:
     """Refuses impossible settings, and targets that can't hold such a scene, before any work is done."""
     compositing = settings_of(options.shapes, **_settings(options)).compositing
-    Options(size=options.size, glsl=options.glsl, layout=options.layout)
+    chosen = _export_options(options)
     for target in targets:
-        api.export(Scene(1, 1, (), compositing=compositing), target)
+        api.check_export(Scene(1, 1, (), compositing=compositing), target, chosen)
 
 
 def _kinds(options: argparse.Namespace) -> list[str]:
@@ -246,14 +261,20 @@ def _name(source: str) -> str:
 
 def _write_exports(scene: Scene, job: _Job, options: argparse.Namespace, say: Callable[[str], None]) -> None:
     title = "a picture" if job.source == STREAM else one_line(_stem(job.source))
+    chosen = _export_options(options, title)
     for target, path in job.outputs.items():
-        data = api.export(
-            scene, target, size=options.size, glsl=options.glsl, layout=options.layout, title=title
-        )
+        data = export(scene, target, chosen)
         raw = data.encode() if isinstance(data, str) else data
         _write(path, raw)
         if path != STREAM:
-            say(f"  {path}: {len(raw):,} bytes{_figure(scene, target)}")
+            say(f"  {path}: {len(raw):,} bytes{_packed(target, raw)}{_figure(scene, target, data, chosen)}")
+        for note in EXPORTERS[target].notes(scene, chosen):
+            say(f"  {note}")
+
+
+def _packed(target: str, data: bytes) -> str:
+    """The size that a web server would send an SVG with."""
+    return f" ({len(gzip.compress(data, 9, mtime=0)):,} gzipped)" if target == "svg" else ""
 
 
 def _write(path: str, data: bytes) -> None:
@@ -264,18 +285,15 @@ def _write(path: str, data: bytes) -> None:
         write_atomically(path, data)
 
 
-def _figure(scene: Scene, target: str) -> str:
+def _figure(scene: Scene, target: str, data: str | bytes, options: Options) -> str:
     """How near the export comes to the render, where an engine can tell; at the fitted size."""
-    from .roundtrip import ROUND_TRIPS, default_sizes
+    from .roundtrip import figure
 
-    if target not in ROUND_TRIPS:
-        return ""
-    trip = ROUND_TRIPS[target]
     try:
-        result = api.check(scene, [target], default_sizes(scene, trip)[:1])[0]
+        result = figure(scene, target, data, options)
     except Sdf2vecError as error:
         return f"; not checked: {one_line(str(error))}"
-    if result.missing:
+    if result is None:
         return ""
     return (
         f"; {result.engine} draws it at {result.psnr:.1f} dB, largest error {result.largest_error:.2g} levels"
@@ -440,9 +458,8 @@ def _export_command(arguments: list[str]) -> int:
 def _write_scene_exports(
     parser: argparse.ArgumentParser, options: argparse.Namespace, targets: list[str]
 ) -> int:
-    options = argparse.Namespace(**{"glsl": "es300", "layout": "auto", **vars(options)})
     (job,) = _plan([options.scene], targets, options.output)
-    Options(size=options.size, glsl=options.glsl, layout=options.layout)
+    _export_options(options)
     scene = _read_scene(options.scene)
     _write_exports(scene, job, options, _speaker(False, STREAM in job.outputs.values()))
     return OK

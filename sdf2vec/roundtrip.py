@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from .engines import ENGINES, EngineError
 from .errors import Sdf2vecError
 from .export import export
-from .export.options import Options
+from .export.options import SVG_PROFILES, Options
 from .image import fitted_size, premultiply
 from .render.reference import render
 from .scene import Scene
@@ -52,15 +52,22 @@ class Check:
 
 @dataclass(frozen=True)
 class RoundTrip:
-    """How a target is drawn: on which engine, with what around the text.
+    """How a target is drawn: on which engine, with what around the text, exported with which options.
 
     A shader fills a canvas of any shape; a drawing (`any_shape=False`) ends at the edges of its picture.
+    `note` tells apart what one engine draws of one target.
     """
 
     target: str
     engine: str
     draw: Callable[[str, int, int], Pixels]
     any_shape: bool = True
+    options: Options = field(default_factory=Options)
+    note: str = ""
+
+    @property
+    def name(self) -> str:
+        return f"{self.target} {self.note}".strip()
 
 
 def check(
@@ -72,7 +79,7 @@ def check(
     Raises Sdf2vecError when no engine can draw any of the targets.
     """
     chosen = set(ROUND_TRIPS) if targets is None else set(targets)
-    trips = [trip for name, trip in ROUND_TRIPS.items() if name in chosen]
+    trips = [trip for name, several in ROUND_TRIPS.items() if name in chosen for trip in several]
     if not trips:
         raise Sdf2vecError(f"nothing to check: engines draw {', '.join(ROUND_TRIPS)}")
     return [
@@ -99,15 +106,24 @@ def _small(width: int, height: int) -> Size:
 def _check_trip(scene: Scene, trip: RoundTrip, sizes: Sequence[Size]) -> list[Check]:
     reason = ENGINES[trip.engine].missing()
     if reason:
-        return [Check(trip.target, trip.engine, missing=reason)]
+        return [Check(trip.name, trip.engine, missing=reason)]
     try:
-        text = export(scene, trip.target, Options())
+        text = export(scene, trip.target, trip.options)
         assert isinstance(text, str)
         return [compare(trip, text, scene, size) for size in sizes]
     except EngineError:
         raise
     except Sdf2vecError as error:
-        return [Check(trip.target, trip.engine, missing=str(error))]
+        return [Check(trip.name, trip.engine, missing=str(error))]
+
+
+def figure(scene: Scene, target: str, data: str | bytes, options: Options) -> Check | None:
+    """An export at the fitted size on the first engine that draws it; None where none is here."""
+    for trip in ROUND_TRIPS.get(target, ()):
+        suits = trip.target != "svg" or trip.options.svg_profile == options.svg_profile
+        if suits and isinstance(data, str) and not ENGINES[trip.engine].missing():
+            return compare(trip, data, scene, default_sizes(scene, trip)[0])
+    return None
 
 
 def compare(trip: RoundTrip, text: str, scene: Scene, size: Size) -> Check:
@@ -120,7 +136,7 @@ def compare(trip: RoundTrip, text: str, scene: Scene, size: Size) -> Check:
     difference = 255.0 * (drawn.astype(np.float64) - expected)
     error = float(np.mean(difference**2))
     return Check(
-        trip.target,
+        trip.name,
         trip.engine,
         width,
         height,
@@ -146,8 +162,14 @@ def _draw_wgsl(text: str, width: int, height: int) -> Pixels:
     return ENGINES["webgpu"].render(text, width, height, uniforms={"resolution": (width, height)})
 
 
-def _draw_svg(text: str, width: int, height: int) -> Pixels:
-    return premultiply(ENGINES["resvg"].render(text, width, height))
+def _drawing(engine: str, profile: str) -> RoundTrip:
+    """An SVG of one profile on one engine."""
+
+    def draw(text: str, width: int, height: int) -> Pixels:
+        return premultiply(ENGINES[engine].render(text, width, height))
+
+    note = profile if profile != SVG_PROFILES[0] else ""
+    return RoundTrip("svg", engine, draw, False, Options(svg_profile=profile), note)
 
 
 # What Shadertoy puts around a pasted text.
@@ -161,12 +183,13 @@ SHADERTOY_TAIL = """
 void main() { mainImage(shadertoy_out_color, gl_FragCoord.xy); }
 """
 
-ROUND_TRIPS = {
-    trip.target: trip
-    for trip in (
-        RoundTrip("glsl", "opengl", _draw_glsl),
-        RoundTrip("shadertoy", "opengl", _draw_shadertoy),
-        RoundTrip("wgsl", "webgpu", _draw_wgsl),
-        RoundTrip("svg", "resvg", _draw_svg, any_shape=False),
-    )
+# CairoSVG sees neither filters nor blend modes, so it is no judge of the profile that has them.
+ROUND_TRIPS: dict[str, tuple[RoundTrip, ...]] = {
+    "glsl": (RoundTrip("glsl", "opengl", _draw_glsl),),
+    "shadertoy": (RoundTrip("shadertoy", "opengl", _draw_shadertoy),),
+    "wgsl": (RoundTrip("wgsl", "webgpu", _draw_wgsl),),
+    "svg": (
+        *(_drawing(engine, "filters") for engine in ("resvg", "librsvg", "chromium", "firefox")),
+        *(_drawing(engine, "portable") for engine in ("resvg", "librsvg", "chromium", "firefox", "cairosvg")),
+    ),
 }

@@ -202,7 +202,7 @@ def test_scenes_export_themselves(target):
     data = scene.to(target)
     assert data == sdf2vec.export(scene, target)
     assert data == sdf2vec.export(sdf2vec.loads(sdf2vec.dumps(scene)), target)
-    assert isinstance(data, bytes if target == "png" else str)
+    assert isinstance(data, bytes if target in ("png", "pdf") else str)
 
 
 def test_export_options_have_the_words_of_the_command_line():

@@ -23,6 +23,7 @@ from sdf2vec import Layer, Scene, Shape
 from sdf2vec.cli import main
 from sdf2vec.engines import ENGINES
 from sdf2vec.fit.presets import PRESETS
+from sdf2vec.roundtrip import ROUND_TRIPS
 
 SHORT = ("--shapes", "3", "--preset", "fast")
 ALL = "glsl,shadertoy,wgsl,svg,json,png"
@@ -233,7 +234,7 @@ def test_same_seed_same_bytes(folder, run):
     ("arguments", "words"),
     [
         ([], ["no picture given", "--help"]),
-        (["photo.jpg", "--emit", "pdf,glsl"], ["unknown target 'pdf'", "glsl"]),
+        (["photo.jpg", "--emit", "eps,glsl"], ["unknown target 'eps'", "glsl"]),
         (["photo.jpg", "--emit", ","], ["--emit"]),
         (["photo.jpg", "--kind", "star"], ["unknown kind 'star'", "circle"]),
         (["photo.jpg", "--kind", "mixed,star"], ["unknown kind 'star'"]),
@@ -257,7 +258,7 @@ def test_same_seed_same_bytes(folder, run):
         (["photo.jpg", "--size", "0", "--emit", "png"], ["size", "got 0"]),
         (["photo.jpg", "--size", "1e3", "--emit", "png"], ["--size"]),
         (["photo.jpg", "--no-such-option"], ["--no-such-option"]),
-        (["photo.jpg", "--emit", "glsl,svg", "--compositing", "additive"], ["svg", "additive"]),
+        (["photo.jpg", "--emit", "glsl,pdf", "--compositing", "additive"], ["svg", "blend modes"]),
         (["missing.png"], ["missing.png", "no such file"]),
         (["two\nlines.png"], ["no such file"]),
         (["."], ["folder"]),
@@ -284,7 +285,12 @@ def test_same_seed_same_bytes(folder, run):
         (["render", "wide.scene.json"], ["megapixels"]),
         (["render", "good.scene.json", "-o", "good.scene.json"], ["overwrite"]),
         (["export", "good.scene.json", "--emit", "json"], ["overwrite"]),
-        (["export", "good.scene.json", "--emit", "pdf"], ["unknown target 'pdf'"]),
+        (["export", "good.scene.json", "--emit", "eps"], ["unknown target 'eps'"]),
+        (
+            ["export", "good.scene.json", "--emit", "svg", "--svg-profile", "flat"],
+            ["SVG profile 'flat'", "portable"],
+        ),
+        (["export", "good.scene.json", "--emit", "svg", "--svg-size-limit", "90"], ["limit of 90"]),
         (["export", "bad.scene.json"], ["layers[0].radius"]),
         (["check", "bad.scene.json"], ["layers[0].radius"]),
         (["check", "good.scene.json", "--emit", "json"], ["nothing to check"]),
@@ -313,8 +319,8 @@ def test_refusals_leave_nothing_behind(folder, run, arguments, words):
 def test_settings_are_refused_before_any_work(folder, run, monkeypatch):
     monkeypatch.setattr("sdf2vec.api.fit", lambda *_, **__: pytest.fail("the fit began"))
     for bad in (
-        ["--emit", "pdf"],
-        ["--compositing", "additive", "--emit", "json,svg"],
+        ["--emit", "eps"],
+        ["--compositing", "additive", "--emit", "json,svg", "--svg-profile", "portable"],
         ["--size", "-1"],
         ["-o", "photo.jpg/sub/"],
     ):
@@ -490,17 +496,17 @@ def test_check_says_what_differs(folder, run, scene_file, monkeypatch, require_e
 
 def test_check_says_what_is_missing_and_how_to_get_it(folder, run, scene_file, monkeypatch):
     advice = "the Python package moderngl is not installed: pip install 'sdf2vec[check]'"
-    for name in ("opengl", "webgpu", "resvg"):
+    for name in ENGINES:
         monkeypatch.setitem(ENGINES, name, replace(ENGINES[name], missing=lambda: advice))
     outcome = run("check", scene_file)
     assert outcome.code == 2
-    assert outcome.out.decode().count(advice) == 4
+    assert outcome.out.decode().count(advice) == sum(map(len, ROUND_TRIPS.values()))
     assert outcome.err.count("\n") == 1
     assert advice in outcome.err
 
 
 def test_a_conversion_needs_no_engine(folder, run, monkeypatch):
-    for name in ("opengl", "webgpu", "resvg"):
+    for name in ENGINES:
         monkeypatch.setitem(ENGINES, name, replace(ENGINES[name], missing=lambda: "absent"))
     outcome = run("photo.jpg", *SHORT, "--emit", "glsl,svg")
     assert outcome.code == 0

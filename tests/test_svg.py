@@ -1,6 +1,8 @@
 """SVG: well-formed by an independent parser, and the render's picture when resvg draws it."""
 
+import base64
 import math
+import random
 import re
 from xml.etree import ElementTree
 
@@ -10,13 +12,16 @@ import torch
 from skimage.morphology import dilation, footprint_rectangle
 
 from sdf2vec import KINDS, Layer, Scene, Sdf2vecError, Shape
-from sdf2vec.engines import ENGINES
+from sdf2vec.engines import ENGINES, chromium
 from sdf2vec.export.options import Options
+from sdf2vec.export.svg import data_uri, notes, pdf
 from sdf2vec.export.svg import svg as write_svg
+from sdf2vec.export.svg.blur import best_blur, trial_of
+from sdf2vec.export.svg.layers import edge_of
 from sdf2vec.image import premultiply
 from sdf2vec.render.reference import render
 
-from .scenes import random_scene
+from .scenes import random_scene, random_shape
 
 NAMESPACE = "{http://www.w3.org/2000/svg}"
 Parameters = dict[str, float | tuple[float, ...]]
@@ -43,12 +48,17 @@ def parsed(scene, **options):
     return ElementTree.fromstring(text_of(scene, **options))
 
 
+def drawn_in(root):
+    """The elements that draw layers: all but title, definitions and background."""
+    return [e for e in root if e.tag not in (f"{NAMESPACE}title", f"{NAMESPACE}defs")][1:]
+
+
 def tags(root):
     return [element.tag.removeprefix(NAMESPACE) for element in root.iter()]
 
 
 def numbers_of(path_data):
-    return [float(number) for number in re.findall(r"-?\d+(?:\.\d+)?(?:e-?\d+)?", path_data)]
+    return [float(number) for number in re.findall(r"-?(?:\d+\.?\d*|\.\d+)", path_data)]
 
 
 @pytest.fixture
@@ -112,7 +122,8 @@ def test_ids_are_unique_and_references_lead_somewhere(transparent):
         for value in element.attrib.values()
         for name in re.findall(r"url\(#(\w+)\)", value)
     ]
-    assert set(used) == set(ids)
+    definitions = [element.get("id") for element in root.findall(f"{NAMESPACE}defs/*")]
+    assert set(used) == set(definitions)
 
 
 def test_same_scene_same_text():
@@ -122,8 +133,8 @@ def test_same_scene_same_text():
 
 def test_no_layers():
     root = parsed(scene_of(background=ORANGE))
-    assert tags(root) == ["svg", "title", "defs", "rect"]
-    assert root[-1].get("fill") == "#ff9900"
+    assert tags(root) == ["svg", "title", "rect"]
+    assert root[-1].get("fill") == "#f90"
     assert "rect" not in tags(parsed(scene_of(background=None)))
 
 
@@ -131,12 +142,42 @@ def test_layers_come_in_draw_order():
     colors = [(i / 15, 0.0, 0.0) for i in range(16)]
     root = parsed(scene_of(*(circle(i / 20, 0, 0.1, color, falloff=0) for i, color in enumerate(colors))))
     fills = [element.get("fill") for element in root.iter(f"{NAMESPACE}circle")]
-    assert fills == [f"#{17 * i:02x}0000" for i in range(16)]
+    assert fills == [f"#{i:x}00" for i in range(16)]
 
 
-def test_additive_is_refused_in_one_line():
-    with pytest.raises(Sdf2vecError, match=r"^svg: additive scenes .* --compositing over$"):
-        text_of(Scene(3, 2, (), compositing="additive"))
+def test_additive_where_nothing_can_be_added_is_refused_in_one_line():
+    with pytest.raises(Sdf2vecError, match=r"^svg: without blend modes .* --compositing over$"):
+        text_of(Scene(3, 2, (), compositing="additive"), svg_profile="portable")
+    with pytest.raises(Sdf2vecError, match=r"^svg: additive scenes on a transparent ground .*$"):
+        text_of(Scene(3, 2, (), None, compositing="additive"))
+
+
+def test_portable_has_neither_filters_nor_blend_modes():
+    text = text_of(random_scene(layers=20, seed=4), svg_profile="portable")
+    assert not re.search(r"<filter|filter=|<mask|<style|mix-blend-mode", text)
+
+
+def test_a_size_limit_is_kept_or_refused():
+    scene = random_scene(("box", "triangle"), layers=40, seed=7, unions={})
+    free = len(text_of(scene).encode())
+    assert len(text_of(scene, svg_size_limit=free).encode()) == free
+    limited = text_of(scene, svg_size_limit=free // 2)
+    assert len(limited.encode()) <= free // 2
+    assert any("drawn coarser" in note for note in notes(scene, Options(svg_size_limit=free // 2)))
+    with pytest.raises(Sdf2vecError, match=r"^svg: [\d,]+ bytes at least, more than the limit of 500"):
+        text_of(scene, svg_size_limit=500)
+
+
+def test_a_data_uri_holds_the_svg():
+    scene = random_scene(layers=3, seed=4)
+    head, _, body = data_uri(scene, Options()).partition(",")
+    assert head == "data:image/svg+xml;base64"
+    assert base64.b64decode(body).decode() == text_of(scene)
+
+
+def test_a_pdf_of_the_portable_profile(require_engine):
+    require_engine("cairosvg")
+    assert pdf(random_scene(layers=6, seed=4), Options()).startswith(b"%PDF-")
 
 
 def test_all_numbers_are_finite_and_plain():
@@ -148,15 +189,15 @@ def test_all_numbers_are_finite_and_plain():
 
 
 def test_a_sharp_circle_is_a_circle():
-    (element,) = parsed(scene_of(circle(0.1, -0.2, 0.25, ORANGE, falloff=0, opacity=0.5)))[3:]
+    (element,) = drawn_in(parsed(scene_of(circle(0.1, -0.2, 0.25, ORANGE, falloff=0, opacity=0.5))))
     assert element.tag == f"{NAMESPACE}circle"
     place = {name: float(element.get(name, "nan")) for name in ("cx", "cy", "r", "fill-opacity")}
     assert place == {"cx": 85, "cy": 30, "r": 25, "fill-opacity": 0.5}
-    assert element.get("fill") == "#ff9900"
+    assert element.get("fill") == "#f90"
 
 
 def test_a_sharp_falloff_moves_the_edge_by_half_of_it():
-    (element,) = parsed(scene_of(circle(0, 0, 0.25, falloff=0.01)))[3:]
+    (element,) = drawn_in(parsed(scene_of(circle(0, 0, 0.25, falloff=0.01))))
     assert float(element.get("r", "nan")) == pytest.approx(25.5)
 
 
@@ -167,7 +208,7 @@ def test_a_sharp_box_is_a_turned_rectangle():
         "angle": math.pi / 6,
         "corner_radius": 0.05,
     }
-    (element,) = parsed(scene_of(Layer((Shape.of("box", WHITE, **numbers),), 0)))[3:]
+    (element,) = drawn_in(parsed(scene_of(Layer((Shape.of("box", WHITE, **numbers),), 0))))
     assert element.tag == f"{NAMESPACE}rect"
     place = {name: float(element.get(name, "nan")) for name in ("x", "y", "width", "height", "rx")}
     assert place == {"x": 45, "y": 40, "width": 60, "height": 40, "rx": 5}
@@ -175,7 +216,7 @@ def test_a_sharp_box_is_a_turned_rectangle():
 
 
 def test_a_sharp_triangle_is_a_polygon():
-    (element,) = parsed(scene_of(triangle((0, -0.4), (0.3, 0.2), (-0.3, 0.2))))[3:]
+    (element,) = drawn_in(parsed(scene_of(triangle((0, -0.4), (0.3, 0.2), (-0.3, 0.2)))))
     assert element.tag == f"{NAMESPACE}polygon"
     assert numbers_of(element.get("points", "")) == [75, 10, 105, 70, 45, 70]
 
@@ -185,11 +226,11 @@ def test_a_sharp_triangle_is_a_polygon():
 )
 def test_rounded_triangles_grow_outwards_whatever_their_orientation(points):
     """1 pixel of falloff moves the edges out by half a pixel: the topmost point to 9.5, the lowest to 70.5."""
-    (element,) = parsed(scene_of(triangle(*points, falloff=0.01)))[3:]
+    (element,) = drawn_in(parsed(scene_of(triangle(*points, falloff=0.01))))
     assert element.tag == f"{NAMESPACE}path"
     data = element.get("d", "")
-    assert data.count("A0.5 0.5 0 0 1") == 3
-    places = numbers_of(data.replace("A0.5 0.5 0 0 1", ""))
+    assert data.count("A.5 .5 0 0 1") == 3
+    places = numbers_of(data.replace("A.5 .5 0 0 1", ""))
     x, y = np.array(places[0::2]), np.array(places[1::2])
     assert y.max() == pytest.approx(70.5, abs=0.011)
     center = np.array([75, 50])
@@ -200,7 +241,7 @@ def test_rounded_triangles_grow_outwards_whatever_their_orientation(points):
 
 def test_coordinates_of_small_pictures_have_more_decimals():
     """A drawing of 1 × 1 pixel is shown at any size, so its coordinates can't be whole hundredths."""
-    (element,) = parsed(scene_of(circle(0.1234, 0, 0.0567, falloff=0), width=1, height=1))[3:]
+    (element,) = drawn_in(parsed(scene_of(circle(0.1234, 0, 0.0567, falloff=0), width=1, height=1)))
     assert float(element.get("cx", "nan")) == pytest.approx(0.6234, abs=1e-4)
     assert float(element.get("r", "nan")) == pytest.approx(0.0567, abs=1e-4)
 
@@ -218,20 +259,20 @@ def test_soft_circles_are_gradients_that_say_the_coverage(levels_off, falloff, b
     ]
     for layer in layers:
         scene = scene_of(layer, background=background)
-        assert levels_off(scene).max() <= 3
-        assert levels_off(scene, 300, 200).max() <= 3
+        assert levels_off(scene).max() <= 4
+        assert levels_off(scene, 300, 200).max() <= 4
     scene = scene_of(*layers, background=background)
     root = parsed(scene)
     assert len(root.findall(f".//{NAMESPACE}radialGradient")) == 3
     assert "filter" not in tags(root)
-    assert levels_off(scene).max() <= 5
+    assert levels_off(scene).max() <= 7
 
 
 def test_soft_ellipses_too(levels_off):
     shape = Shape.of("ellipse", ORANGE, center=(0.1, 0.05), radii=(0.5, 0.15), angle=0.7)
     scene = scene_of(Layer((shape,), 0.1, 0.9))
     assert "filter" not in tags(parsed(scene))
-    assert levels_off(scene).max() <= 3
+    assert levels_off(scene).max() <= 4
 
 
 SHARP: dict[str, Parameters] = {
@@ -251,7 +292,7 @@ def test_sharp_shapes_away_from_their_edges(levels_off, kind, falloff):
     assert 0.5 < inner.mean() < 0.99
     off = levels_off(scene)
     assert off[inner].max() <= 1
-    assert off.max() < 45  # an edge in the wrong place by half a pixel would be off by 102
+    assert off.max() < 55  # an edge in the wrong place by half a pixel would be off by 102
 
 
 def test_sharp_unions_are_traced(levels_off):
@@ -260,7 +301,7 @@ def test_sharp_unions_are_traced(levels_off):
     assert len(parsed(scene).findall(f".//{NAMESPACE}path")) == 1
     off = levels_off(scene)
     assert off[away_from_edges(scene)].max() <= 1
-    assert off.max() < 40
+    assert off.max() < 50
 
 
 def test_a_union_around_a_hole(levels_off):
@@ -273,13 +314,44 @@ def test_a_union_around_a_hole(levels_off):
     assert levels_off(scene)[away_from_edges(scene)].max() <= 1
 
 
-@pytest.mark.parametrize("kind", ["box", "triangle", "displaced"])
-def test_soft_edges_by_blurring_are_near(levels_off, kind):
-    """A Gaussian is not the logistic curve, and corners differ more: so only near, and nearer on average."""
-    scene = scene_of(Layer((Shape.of(kind, WHITE, **SHARP[kind]),), 0.08))
+@pytest.mark.parametrize("falloff", [0.03, 0.08, 0.5])
+@pytest.mark.parametrize(("kind", "largest"), [("box", 4), ("triangle", 4), ("displaced", 64)])
+def test_soft_shapes_alone(levels_off, kind, largest, falloff):
+    """White on black: the worst case. Slices say the coverage; bands have steps."""
+    scene = scene_of(Layer((Shape.of(kind, WHITE, **SHARP[kind]),), falloff))
+    for size in [(150, 100), (300, 200), (450, 300)]:
+        assert levels_off(scene, *size).max() <= largest
+        assert levels_off(scene, *size).mean() <= 2
+
+
+def test_slices_have_no_seams(levels_off):
+    """Translucent slices that shared or missed a row of pixels would be off by up to 64 levels there."""
+    sides = [(0.3 * math.cos(a), 0.3 * math.sin(a)) for a in (0.3, 2.2, 4.4)]
+    layer = Layer((Shape.of("triangle", WHITE, a=sides[0], b=sides[1], c=sides[2]),), 0.1, 0.5)
+    for size in [(150, 100), (297, 198), (615, 410)]:
+        assert levels_off(scene_of(layer), *size).max() <= 3
+
+
+@pytest.mark.parametrize("kind", ["box", "triangle"])
+def test_blurs_where_they_are_near_enough(levels_off, kind):
+    """A shape of little contrast is blurred in one element; portable drawings never have a filter."""
+    layer = Layer((Shape.of(kind, (0.25, 0.25, 0.25), **SHARP[kind]),), 0.2)
+    scene = scene_of(layer, background=(0.2, 0.2, 0.2), width=600, height=400)
     assert parsed(scene).findall(f".//{NAMESPACE}feGaussianBlur")
-    assert levels_off(scene).max() < 45
-    assert levels_off(scene).mean() < 2.5
+    assert levels_off(scene).max() <= 3
+    assert "filter" not in tags(parsed(scene, svg_profile="portable"))
+
+
+@pytest.mark.parametrize("kind", ["box", "triangle"])
+def test_a_fitted_blur_is_nearer_than_a_plain_one(kind):
+    """Sharper corners undo what the blur takes off them; compared by the same Gaussian on a grid."""
+    layer = Layer((Shape.of(kind, WHITE, **SHARP[kind]),), 0.2)
+    fitted = best_blur(layer, (600, 400, 400.0))
+    assert fitted is not None
+    rounded = edge_of(layer, 0.5)
+    assert rounded is not None
+    plain = trial_of(layer, (600, 400, 400.0)).blurred(rounded, 1.0)
+    assert fitted.error < 0.6 * plain.error
 
 
 def test_a_traced_shape_larger_than_the_canvas(levels_off):
@@ -306,8 +378,8 @@ def test_a_traced_shape_larger_than_the_canvas(levels_off):
 )
 def test_triangles_without_area_are_drawn_as_lines(points):
     """The distance to a segment: at falloff f its outline is a stadium of radius f / 2, half a pixel here."""
-    (element,) = parsed(scene_of(triangle(*points, falloff=0.015)))[3:]
-    arcs = re.findall(r"A0\.75 0\.75 0 0 1 (\S+) ([^LZ]+)", element.get("d", ""))
+    (element,) = drawn_in(parsed(scene_of(triangle(*points, falloff=0.015))))
+    arcs = re.findall(r"A\.75 \.75 0 0 1 (\S+) ([^LZ]+)", element.get("d", ""))
     ends = {(float(x), round(float(y), 2)) for x, y in arcs if abs(float(x) - 75) > 1}
     assert ends == {(45.0, 49.25), (105.0, 50.75)} or ends == {(45.0, 49.25), (105.0, 49.25), (105.0, 50.75)}
 
@@ -337,4 +409,86 @@ def test_smaller_than_any_pixel():
     shape = Shape.of("ellipse", WHITE, center=(0, 0), radii=(1e-6, 1e-6), angle=0)
     for falloff in (0.0, 0.1, 64.0):
         root = parsed(scene_of(Layer((shape,), falloff), width=1, height=1))
-        assert len(root) == 4
+        assert drawn_in(root)
+
+
+# --- as every renderer draws it ----------------------------------------------------------------------------
+
+FILTERS = ("resvg", "librsvg", "chromium", "firefox")
+SIZES = [(150, 100), (300, 200), (260, 110)]  # fitted, twice, and neither that size nor that shape
+
+
+def off_in(engine, scene, profile, size):
+    """Signed differences in levels of 255, [H, W, 4]; beyond the drawing's edges nothing is compared."""
+    drawn = premultiply(ENGINES[engine].render(text_of(scene, svg_profile=profile), *size))
+    width, height = size
+    scale = min(width / scene.width, height / scene.height)
+    across, down = (round((n - m * scale) / 2) for n, m in ((width, scene.width), (height, scene.height)))
+    expected = render(scene, width, height, dtype=torch.float64).permute(1, 2, 0).numpy()
+    inner = np.s_[down : height - down, across : width - across]
+    return 255 * (drawn - expected)[inner]
+
+
+def soft_scene(compositing="over", background=(0.3, 0.4, 0.5)):
+    """Twelve soft shapes of all kinds, little and much contrast, some translucent."""
+    r = random.Random(3)
+    layers = []
+    for index in range(12):
+        shape = random_shape(sorted(KINDS)[index % 5], r)
+        if compositing == "additive":
+            sign = (-1) ** index * 0.25
+            shape = Shape(shape.kind, shape.parameters, tuple(sign * c for c in shape.color))
+        layers.append(Layer((shape,), r.uniform(0.05, 0.4), r.uniform(0.3, 1.0)))
+    return Scene(150, 100, tuple(layers), background, compositing)
+
+
+@pytest.mark.parametrize(
+    ("engine", "profile"),
+    [*((engine, "filters") for engine in FILTERS), *((e, "portable") for e in (*FILTERS, "cairosvg"))],
+)
+@pytest.mark.parametrize("background", [(0.3, 0.4, 0.5), None], ids=["opaque", "transparent"])
+def test_every_renderer_draws_the_same(require_engine, engine, profile, background):
+    require_engine(engine)
+    scene = soft_scene(background=background)
+    for size in SIZES if engine != "firefox" else SIZES[:1]:
+        off = off_in(engine, scene, profile, size)
+        assert 10 * math.log10(255**2 / np.mean(off**2)) > 40, size
+        assert abs(off.mean()) < 0.7, size
+
+
+@pytest.mark.parametrize("engine", FILTERS)
+def test_sums_in_every_renderer_that_can_add(require_engine, engine):
+    require_engine(engine)
+    scene = soft_scene("additive")
+    off = off_in(engine, scene, "filters", (300, 200))
+    assert 10 * math.log10(255**2 / np.mean(off**2)) > 38
+    assert abs(off.mean()) < 1
+
+
+def test_sums_leave_the_range_neither_above_nor_below(levels_off):
+    """1 + 1 − 1: in that order it would be cut off at 1 and end at 0."""
+    layers = [circle(0, 0, 0.3, (c, c, c), falloff=0.1) for c in (0.8, 0.8, -0.8)]
+    scene = Scene(150, 100, tuple(layers), BLACK, "additive")
+    assert levels_off(scene).max() <= 6
+    assert notes(scene, Options()) == ()
+
+
+def test_two_drawings_in_one_page_do_not_disturb_each_other(require_engine):
+    """Inline or as <img>, alone, twice, or with another that has the same kinds of definitions: equal pixels.
+
+    Compared at one place of the page, for browsers dither gradients by place.
+    """
+    require_engine("chromium")
+    one, other = text_of(soft_scene()), text_of(soft_scene(background=(0.9, 0.1, 0.1)))
+    image = '<img src="one.svg">'
+
+    def second_in(*drawings):
+        style = "<style>*{margin:0}svg,img{display:block}</style>"
+        page = f"<!DOCTYPE html>{style}{''.join(drawings)}"
+        with chromium.opened({"index.html": page, "one.svg": one}, 150, 300) as opened:
+            return chromium.screenshot(opened)[100:200]
+
+    alone = second_in(other, one)
+    assert np.abs(alone - second_in(one, other)).max() > 0.2
+    for drawings in ((one, one), (image, image, image), (one, image, one), (other, image, other)):
+        np.testing.assert_array_equal(second_in(*drawings), alone)

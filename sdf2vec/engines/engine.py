@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from xml.etree import ElementTree
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,6 +12,7 @@ from sdf2vec.errors import Sdf2vecError
 Picture = NDArray[np.float32]  # [height, width, 4], row 0 is the top of the picture
 Uniforms = Mapping[str, float | tuple[float, ...]]
 
+SVG_NAMESPACE = "http://www.w3.org/2000/svg"
 LARGEST_SIDE = 16384
 LARGEST_AREA = 2**26  # one gibibyte of float32 RGBA
 
@@ -62,3 +64,24 @@ def require_drawable(width: int, height: int) -> None:
             f"cannot draw {width} × {height} pixels: "
             f"a side has 1 to {LARGEST_SIDE}, the picture at most {LARGEST_AREA}"
         )
+
+
+def with_viewport(svg: str, width: int, height: int) -> str:
+    """An SVG with another width and height, fitted into them and centred, just as a browser does.
+
+    Raises:
+        EngineError: the size is out of range or the text is no SVG.
+    """
+    require_drawable(width, height)
+    try:
+        root = ElementTree.fromstring(svg)
+    except ElementTree.ParseError as error:
+        raise EngineError(f"the SVG is not well-formed XML: {error}") from None
+    if root.tag != f"{{{SVG_NAMESPACE}}}svg":
+        raise EngineError(f"the SVG has no svg element at its root, but {root.tag!r}")
+    if "viewBox" not in root.attrib and {"width", "height"} <= root.attrib.keys():
+        own_size = (root.attrib[name].removesuffix("px") for name in ("width", "height"))
+        root.set("viewBox", " ".join(("0 0", *own_size)))
+    root.set("width", str(width))
+    root.set("height", str(height))
+    return ElementTree.tostring(root, encoding="unicode")

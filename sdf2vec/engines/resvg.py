@@ -2,14 +2,18 @@
 
 import io
 from functools import cache
-from xml.etree import ElementTree
 
 import numpy as np
 from PIL import Image
 
-from sdf2vec.engines.engine import EngineError, Picture, reason_missing, require_drawable, require_present
-
-SVG_NAMESPACE = "http://www.w3.org/2000/svg"
+from sdf2vec.engines.engine import (
+    SVG_NAMESPACE,
+    EngineError,
+    Picture,
+    reason_missing,
+    require_present,
+    with_viewport,
+)
 
 
 @cache
@@ -30,31 +34,16 @@ def render(svg: str, width: int, height: int) -> Picture:
     Raises:
         EngineError: resvg is missing, the size is out of range or the SVG is refused.
     """
-    require_drawable(width, height)
+    sized = with_viewport(svg, width, height)
     require_present(missing())
     import resvg_py
 
-    sized = _with_viewport(svg, width, height)
     try:
         png = resvg_py.svg_to_bytes(svg_string=sized, skip_system_fonts=True)
     except ValueError as error:
         raise EngineError(f"resvg refuses the SVG: {error}", log=str(error)) from None
     with Image.open(io.BytesIO(png)) as picture:
         return np.asarray(picture.convert("RGBA"), np.float32) / np.float32(255)
-
-
-def _with_viewport(svg: str, width: int, height: int) -> str:
-    """The SVG with another width and height (asked for a size itself, resvg keeps the proportions)."""
-    try:
-        root = ElementTree.fromstring(svg)
-    except ElementTree.ParseError as error:
-        raise EngineError(f"the SVG is not well-formed XML: {error}") from None
-    if "viewBox" not in root.attrib and {"width", "height"} <= root.attrib.keys():
-        own_size = (root.attrib[name].removesuffix("px") for name in ("width", "height"))
-        root.set("viewBox", " ".join(("0 0", *own_size)))
-    root.set("width", str(width))
-    root.set("height", str(height))
-    return ElementTree.tostring(root, encoding="unicode")
 
 
 def _draw_nothing() -> None:

@@ -1,0 +1,149 @@
+"""Pages and SVG drawn by Chromium, headless, through Playwright; the browser is the system's own.
+
+One browser is started per process and lives until the process ends. Pages are given their files from memory;
+nothing is served on a port and nothing else can be reached.
+"""
+
+import atexit
+import io
+import mimetypes
+import shutil
+import tempfile
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+from functools import cache
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from PIL import Image
+
+from sdf2vec.engines.engine import (
+    EngineError,
+    Picture,
+    reason_missing,
+    require_drawable,
+    require_present,
+    with_viewport,
+)
+
+if TYPE_CHECKING:
+    from playwright.sync_api import BrowserContext, Page, Route
+
+PROGRAMS = ("chromium", "chromium-browser", "google-chrome", "google-chrome-stable")
+ORIGIN = "http://localhost/"  # a secure context, which WebGPU wants; requests never leave the process
+SECONDS = 60.0
+
+ARGUMENTS = (
+    "--no-sandbox",
+    "--disable-quic",
+    "--no-first-run",
+    "--disable-background-networking",
+    "--disable-component-update",
+    "--disable-sync",
+    "--force-device-scale-factor=1",
+    "--force-color-profile=srgb",
+    "--hide-scrollbars",
+    # WebGL2 and WebGPU in software, by SwiftShader
+    "--use-gl=angle",
+    "--use-angle=swiftshader",
+    "--enable-unsafe-swiftshader",
+    "--ignore-gpu-blocklist",
+    "--enable-unsafe-webgpu",
+    "--use-webgpu-adapter=swiftshader",
+    "--disable-gpu-rasterization",  # drawings are rasterized on the CPU, the same everywhere
+)
+
+IMAGE_PAGE = (
+    "<!DOCTYPE html><style>*{margin:0}img{display:block;width:100vw;height:100vh}</style>"
+    '<img id="picture" src="picture.svg" alt="">'
+)
+
+
+@cache
+def missing() -> str | None:
+    """None if Chromium works here, else one line on what is missing and how to get it."""
+    return reason_missing(_browser, "a browser is needed: apt-get install chromium")
+
+
+def render(svg: str, width: int, height: int) -> Picture:
+    """Draws an SVG, as an `<img>` in a page, into a viewport of `width` × `height` pixels.
+
+    Returns:
+        float32 `[height, width, 4]` in 0..1 with straight (not premultiplied) alpha, row 0 at the top.
+
+    Raises:
+        EngineError: Chromium is missing, the size is out of range or the SVG is refused.
+    """
+    sized = with_viewport(svg, width, height)
+    with opened({"index.html": IMAGE_PAGE, "picture.svg": sized}, width, height) as page:
+        try:
+            page.evaluate("document.getElementById('picture').decode()")
+        except Exception as error:  # Playwright's own error; its first line is the page's exception
+            raise EngineError(f"Chromium refuses the SVG: {_first_line(error)}", log=str(error)) from None
+        return screenshot(page)
+
+
+@contextmanager
+def opened(files: Mapping[str, str | bytes], width: int, height: int) -> Iterator["Page"]:
+    """A page that shows `files["index.html"]` in a viewport of `width` × `height` pixels, one device pixel each.
+
+    Other files are found by their names relative to it; every other address fails. The page is Playwright's
+    (`evaluate`, `wait_for_function`, `on("console", …)`), and is closed at the end. `evaluate` gives Playwright's
+    own errors.
+
+    Raises:
+        EngineError: Chromium is missing or the size is out of range.
+    """
+    require_drawable(width, height)
+    require_present(missing())
+    page = _browser().new_page()
+    try:
+        page.set_default_timeout(1000 * SECONDS)
+        page.set_viewport_size({"width": width, "height": height})
+        page.route("**/*", lambda route: _answer(route, files))
+        page.goto(ORIGIN, wait_until="load")
+        yield page
+    finally:
+        page.close()
+
+
+def screenshot(page: "Page", selector: str | None = None) -> Picture:
+    """What a page, or the first element that a CSS selector finds in it, shows now.
+
+    Returns:
+        float32 `[height, width, 4]` in 0..1 with straight alpha: a page without a background is transparent.
+    """
+    place = page.locator(selector).first if selector else page
+    png = place.screenshot(type="png", omit_background=True, animations="disabled")
+    with Image.open(io.BytesIO(png)) as picture:
+        return np.asarray(picture.convert("RGBA"), np.float32) / np.float32(255)
+
+
+def _answer(route: "Route", files: Mapping[str, str | bytes]) -> None:
+    name = route.request.url.partition("?")[0].removeprefix(ORIGIN) or "index.html"
+    if name in files:
+        kind = mimetypes.guess_type(name)[0] or "application/octet-stream"
+        route.fulfill(body=files[name], content_type=f"{kind}; charset=utf-8")
+    else:
+        route.abort()
+
+
+@cache
+def _browser() -> "BrowserContext":
+    from playwright.sync_api import sync_playwright
+
+    program = next(filter(None, map(shutil.which, PROGRAMS)), None)
+    if program is None:
+        raise EngineError("Chromium is not installed")
+    profile = tempfile.mkdtemp(prefix="sdf2vec-chromium-")
+    atexit.register(shutil.rmtree, profile, ignore_errors=True)
+    playwright = sync_playwright().start()
+    atexit.register(playwright.stop)
+    options: dict[str, Any] = {"executable_path": program, "headless": True, "args": list(ARGUMENTS)}
+    browser = playwright.chromium.launch_persistent_context(profile, device_scale_factor=1, **options)
+    atexit.register(browser.close)
+    return browser
+
+
+def _first_line(error: Exception) -> str:
+    return str(error).strip().partition("\n")[0]

@@ -1,0 +1,64 @@
+"""How much each layer shows: what an error of its coverage costs in the finished picture."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ...scene import Scene
+from .field import Array
+
+SIDE = 128  # pixels along the shortest side of the picture that is weighed
+MOST = 1 << 24  # layers × pixels
+
+
+def contrasts(scene: Scene) -> Array:
+    """[N]: the mean squared change of the picture, per channel, that an error 1 of each layer's coverage makes.
+
+    Under `over` it counts what lies below the layer and how much of it later layers hide; the mean is over the
+    layer's soft edge.
+    """
+    covers, colors = layers_at(scene, SIDE)
+    soft = covers * (1.0 - covers) + 1e-3 * covers + 1e-9
+    if scene.compositing == "additive":
+        change = np.square(colors).mean(axis=1)
+        return np.asarray(np.sum(soft * change, axis=1) / soft.sum(axis=1))
+    opacity = np.array([layer.opacity for layer in scene.layers])[:, None]
+    alphas = covers * opacity
+    hidden = np.ones_like(alphas)
+    hidden[:-1] = np.cumprod(1.0 - alphas[:0:-1], axis=0)[::-1]
+    below = np.zeros((4, covers.shape[1]))
+    if scene.background is not None:
+        below += np.array([*scene.background, 1.0])[:, None]
+    found = np.empty(len(covers))
+    for i, alpha in enumerate(alphas):
+        own = np.concatenate([np.broadcast_to(colors[i], (3, len(alpha))), np.ones((1, len(alpha)))])
+        change = np.square(own - below)
+        shown = change[:3].mean(axis=0) + (change[3] if scene.background is None else 0.0)
+        shown = shown * np.square(hidden[i] * opacity[i])
+        found[i] = np.sum(soft[i] * shown) / soft[i].sum()
+        below = below + (own - below) * alpha
+    return found
+
+
+def layers_at(scene: Scene, side: int) -> tuple[Array, Array]:
+    """Coverage [N, P] and colour [N, 3, P or 1] of all layers on a small canvas of the scene's shape."""
+    import torch
+
+    from ...render.reference import canvas, group_coverage
+    from ...render.tensors import from_scene
+
+    shortest = min(scene.width, scene.height)
+    most = (MOST / max(1, len(scene.layers)) * shortest**2 / (scene.width * scene.height)) ** 0.5
+    scale = min(side, max(8, int(most)), shortest) / shortest
+    width, height = max(1, round(scene.width * scale)), max(1, round(scene.height * scale))
+    tensors = from_scene(scene)
+    x, y, pixel = canvas(tensors, width, height)
+    covers = np.zeros((len(scene.layers), width * height))
+    varied = any(len(layer.shapes) > 1 for layer in scene.layers)
+    colors = np.zeros((len(scene.layers), 3, width * height if varied else 1))
+    with torch.no_grad():
+        for group in tensors.groups:
+            cover, color = group_coverage(group, x, y, pixel * scale)
+            covers[group.order.numpy()] = cover.numpy()
+            colors[group.order.numpy()] = color.numpy()
+    return covers, colors
