@@ -103,10 +103,10 @@ def quality(scene: Scene, picture: Picture) -> Quality:
     from .fit.loop import scaled
     from .flip import flip
     from .metrics import psnr
-    from .render.draw import draw
+    from .render.draw import draw_fast
 
     pixels = premultiply(picture.pixels) if picture.has_alpha else picture.pixels
-    drawn = draw(scene, picture.width, picture.height)[: pixels.shape[2]]
+    drawn = draw_fast(scene, picture.width, picture.height)[: pixels.shape[2]]
     target = torch.from_numpy(np.ascontiguousarray(pixels.transpose(2, 0, 1)))
     small = [scaled(planes.permute(1, 2, 0).numpy(), FLIP_RESOLUTION) for planes in (drawn, target)]
     height, width = small[0].shape[1:]

@@ -85,7 +85,7 @@ def test_settings_matter_and_defaults_are_said(levels):
 
 def test_names_of_kinds():
     assert kinds_of("box") == ("box",)
-    assert kinds_of(["box", "circle", "box"]) == ("box", "circle")
+    assert kinds_of(["box", "circle", "box"]) == ("circle", "box")
     assert kinds_of("mixed") == kinds_of(["box", "mixed"]) == tuple(sdf2vec.KINDS)
 
 

@@ -101,7 +101,7 @@ def page(names: Sequence[str], output: Path) -> str:
                 "# How near a fit comes, and what it costs",
                 f"    python -m sdf2vec.bench.fit PICTURE... -o {output.as_posix()}",
                 "Triangles under `over`, scored at the pictures' own size; on "
-                f"{available_cores()} CPU cores, kernels compiled before. `balanced`: the median of {len(SEEDS)} seeds; "
+                f"{available_cores()} CPU cores, kernels compiled before. `balanced`: median of {len(SEEDS)} seeds; "
                 "the others: one seed.",
                 f"## By number of shapes: {first}\n\n![FLIP by CPU seconds]({chart.name})",
                 *(f"`{preset}`\n\n" + "\n".join(count_table(found)) for preset, found in rows.items()),

@@ -65,9 +65,9 @@ def page(name: str, output: Path) -> str:
                 f"    python -m sdf2vec.bench.thesis PICTURE -o {output.as_posix()}",
                 "FLIP, lower is better; one seed. Thesis: printed in its tables 5.1 and 5.2, made on a CUDA GPU. "
                 "`thesis` here: its method by the fused kernels, on the CPU; what it leaves open is stated in "
-                "`fit/presets.py`. `balanced`: the default fit with the same kind of shape, number and compositing, by "
-                "its own loss. Where shapes are joined, the number counts shapes, not layers. Seconds include compiling "
-                "kernels when a kind is new.",
+                "`fit/presets.py`. `balanced`: the default fit with the same kind, number and compositing, by "
+                "its own loss. Where shapes are joined, the number counts shapes, not layers. Seconds include "
+                "compiling kernels when a kind is new.",
                 "\n".join(rows(load(name))),
             )
         )

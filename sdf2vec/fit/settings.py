@@ -188,7 +188,7 @@ def kinds_of(kind: str | Sequence[str]) -> tuple[str, ...]:
         check_choice("kind", name, (*KINDS, MIXED))
     if not names:
         raise Sdf2vecError("at least one kind of shape is needed")
-    return tuple(KINDS) if MIXED in names else tuple(dict.fromkeys(names))
+    return tuple(kind for kind in KINDS if kind in names or MIXED in names)
 
 
 def losses_of(loss: str | Sequence[tuple[str, float]] | None) -> Loss | None:

@@ -12,17 +12,36 @@ LARGE = 1 << 25  # layers × pixels from which compiling kernels pays
 
 
 def draw(scene: Scene, width: int | None = None, height: int | None = None) -> torch.Tensor:
-    """The scene as a screen shows it: premultiplied RGBA, [4, height, width], 0..1, float32."""
+    """The scene as a screen shows it: premultiplied RGBA, [4, height, width], 0..1, float32.
+
+    The same numbers every time: what has been compiled before does not count.
+    """
     width, height = width or scene.width, height or scene.height
     if len(scene.layers) * width * height < LARGE:
         return reference.render(scene, width, height)
-    with torch.no_grad():
-        return reference.displayed(_composite(from_scene(scene), width, height))
+    return _drawn_fused(from_scene(scene), width, height)
+
+
+def draw_fast(scene: Scene, width: int, height: int) -> torch.Tensor:
+    """The same, by the kernels that a fit has left where there are any; then digits differ beyond the sixth."""
+    tensors = from_scene(scene)
+    if fused.is_compiled(tensors, 3 if _is_opaque(tensors) else 4):
+        return _drawn_fused(tensors, width, height)
+    return draw(scene, width, height)
+
+
+@torch.no_grad()
+def _drawn_fused(tensors: SceneTensors, width: int, height: int) -> torch.Tensor:
+    return reference.displayed(_composite(tensors, width, height))
+
+
+def _is_opaque(tensors: SceneTensors) -> bool:
+    """Over an opaque background the picture is opaque: the kernels of a fit, of 3 channels, are enough."""
+    return not tensors.transparent and tensors.compositing == "over"
 
 
 def _composite(tensors: SceneTensors, width: int, height: int) -> torch.Tensor:
-    """Over an opaque background the picture is opaque: the kernels of a fit, of 3 channels, are enough."""
-    if tensors.transparent or tensors.compositing != "over":
+    if not _is_opaque(tensors):
         return fused.composite(tensors, width, height)
     color = fused.composite(tensors, width, height, 3)
     return torch.cat([color, torch.ones_like(color[:1])])

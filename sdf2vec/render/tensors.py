@@ -84,9 +84,11 @@ def from_scene(scene: Scene, dtype: torch.dtype = torch.float32, device: str = "
     members: dict[tuple[str, int], list[int]] = defaultdict(list)
     for index, layer in enumerate(scene.layers):
         members[layer.kind, len(layer.shapes)].append(index)
+    places = {kind: place for place, kind in enumerate(KINDS)}
+    groups = sorted(members.items(), key=lambda item: (places[item[0][0]], item[0][1]))
     background = (*scene.background, 1.0) if scene.background is not None else (0.0,) * 4
     return SceneTensors(
-        [_group(scene, kind, order, dtype, device) for (kind, _), order in members.items()],
+        [_group(scene, kind, order, dtype, device) for (kind, _), order in groups],
         torch.tensor(background, dtype=dtype, device=device),
         scene.compositing,
         scene.extent,
