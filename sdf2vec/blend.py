@@ -161,6 +161,12 @@ def covering_scene_point(pixel: Expr, resolution: Expr, size: Expr) -> Expr:
 FRAMINGS = {"fit": (scene_point, pixel_size), "cover": (covering_scene_point, covering_pixel_size)}
 
 
+@function("surfacePoint", uv=VEC2, size=VEC2)
+def surface_point(uv: Expr, size: Expr) -> Expr:
+    """The scene's point at a place 0..1 of a surface (y down) that it fills."""
+    return (uv - 0.5) * size
+
+
 @function("gridPoint", p=VEC2, low=VEC2, cells=VEC2)
 def grid_point(p: Expr, low: Expr, cells: Expr) -> Expr:
     """p in a grid that begins at low and has so many cells a unit."""

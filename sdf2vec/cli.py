@@ -137,6 +137,7 @@ def _add_emit(parser: argparse.ArgumentParser, default: str) -> None:
     listed = "; ".join(f"{name}: {exporter.about}" for name, exporter in EXPORTERS.items())
     parser.add_argument(
         "--emit",
+        "--target",
         action="append",
         metavar="TARGETS",
         help=f"what to write, separated by commas (default: {default}). {listed}",

@@ -100,7 +100,7 @@ def test_many_shapes(require_engine):
         made = shader(scene, target, Options())
         assert made.choice.layout == "data"
         assert made.choice.depth < 60
-        for size in ((180, 120), (48, 20)):
+        for size in ((150, 102), (48, 20)):
             drawn = ROUND_TRIPS[target][0].draw(made.text, *size, made.data)
             assert error_at_some_pixels(scene, drawn) <= 0.05
 
@@ -189,8 +189,8 @@ def test_lists_hold_all_that_is_seen(compositing, across):
     """Points all over a cell, and beyond the border: a layer with coverage there is listed, or hidden."""
     scene = dataclasses.replace(random_scene(compositing=compositing, layers=40, seed=11), width=90)
     tiles = bin_layers(scene, scene_grid(scene, across))
-    x, y = (torch.from_numpy(np.linspace(-1.4, 1.4, 141)).repeat(141), None)
-    y = torch.from_numpy(np.linspace(-1.2, 1.2, 141)).repeat_interleave(141)
+    x = torch.from_numpy(np.linspace(-1.4, 1.4, 71)).repeat(71)
+    y = torch.from_numpy(np.linspace(-1.2, 1.2, 71)).repeat_interleave(71)
     cells = _cell_of(tiles.grid, x.numpy(), y.numpy())
     cover = _coverages(scene, x, y)  # [L, P]
     opaque = [scene.compositing == "over" and layer.opacity == 1.0 for layer in scene.layers]
@@ -277,7 +277,7 @@ def test_the_choice_is_said():
     made = shader(many(300), "glsl", Options())
     assert made.about.startswith("layout tiled (")
     assert "warning" not in made.about
-    large = shader(many(900), "glsl", Options(layout="table"))
+    large = shader(many(700), "glsl", Options(layout="tiled"))
     assert len(large.text) > TEXT_LIMIT
     assert "warning: more than 64 KiB" in large.about
 
@@ -304,7 +304,7 @@ def test_files_beside_the_text_hold_the_data():
 def test_glslang_accepts_every_layout(layout, version, compositing, require_engine):
     require_engine("glslang")
     for kinds in (("triangle",), tuple(KINDS)):
-        scene = random_scene(kinds, compositing, layers=12, seed=10)
+        scene = random_scene(kinds, compositing, layers=6, seed=10)
         assert glslang_validate(shader(scene, "glsl", Options(layout=layout, glsl=version)).text) is None
         if layout != "data":
             text = shader(scene, "shadertoy", Options(layout=layout, animate=True)).text

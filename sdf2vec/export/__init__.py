@@ -38,6 +38,8 @@ def _shader(name: str, suffix: str, about: str) -> Exporter:
         return (shader.shader(scene, name, options).about,)
 
     def beside(scene: Scene, options: Options) -> dict[str, bytes]:
+        if name == "three":  # it holds its own data
+            return {}
         return shader.files_beside(shader.shader(scene, name, options), suffix)
 
     return Exporter(suffix, write, about, notes, beside)
@@ -51,6 +53,8 @@ EXPORTERS: dict[str, Exporter] = {
     "glsl": _shader("glsl", ".glsl", "fragment shader, GLSL ES 3.00, ES 1.00 or 3.30"),
     "shadertoy": _shader("shadertoy", ".shadertoy.glsl", "mainImage to paste into Shadertoy"),
     "wgsl": _shader("wgsl", ".wgsl", "shader module for WebGPU"),
+    "three": _shader("three", ".three.js", "three.js material, an ES module"),
+    "godot": _shader("godot", ".gdshader", "canvas item shader for Godot 4"),
     "svg": Exporter(".svg", svg.svg, "SVG that looks the same in every renderer", svg.notes),
     "data-uri": Exporter(".uri.txt", svg.data_uri, "that SVG as a data URI", svg.notes),
     "pdf": Exporter(".pdf", svg.pdf, "the portable SVG as PDF, by CairoSVG"),

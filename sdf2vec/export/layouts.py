@@ -30,7 +30,6 @@ CELLS_ACROSS = (2, 4, 8, 12, 16, 24, 32, 48)
 MOST_CELLS = 1 << 13
 LIST_BYTES_A_SECOND = 20_000.0  # of constant lists that compilers take
 FRAMES = 30  # frames that weigh as much as one compilation
-BESIDE = 15.0  # seconds that having to load a second file weighs
 NUMBER = 8.5  # characters of a number in a table, with its separator
 
 
@@ -55,15 +54,23 @@ COSTS = {
 
 @dataclass(frozen=True)
 class Host:
-    """What a target's surroundings allow: layouts, and how many bytes of text weigh as much as a second."""
+    """What a target's surroundings allow: layouts, and how many bytes of text weigh as much as a second.
+
+    `frames`: how many of a software engine's frames weigh as much as they take.
+    """
 
     layouts: tuple[str, ...]
     bytes_a_second: float
+    frames: float = FRAMES
+    beside: float = 15.0  # seconds that having to load a second file weighs
 
 
 CONSTANT = ("table", "tiled")
-PASTED = Host(("readable", "table", "tiled", "packed"), 1500.0)
+PASTED = Host(
+    ("readable", "table", "tiled", "packed"), 4000.0, frames=3.0
+)  # seen on a GPU, where frames are quick
 FILE = Host(("readable", "table", "tiled", "packed", "data"), 100_000.0)
+EMBEDDED = Host(("readable", "data"), 100_000.0, beside=0.0)  # a module that holds its own data
 MODULE = Host(("readable", "data"), 100_000.0)  # WGSL: indexing a constant array hangs some compilers
 OLD = Host(("readable",), 100_000.0)  # GLSL ES 1.00 has neither constant arrays nor texelFetch
 
@@ -104,8 +111,8 @@ def fits_constants(scene: Scene) -> bool:
 
 def _score(choice: Choice, host: Host) -> float:
     """Seconds until a user has seen enough, and the weight of the text; far more beyond what hosts take."""
-    seconds = choice.compile + FRAMES * choice.frame + choice.text / host.bytes_a_second
-    seconds += BESIDE if choice.layout == "data" else 0.0
+    seconds = choice.compile + host.frames * choice.frame + choice.text / host.bytes_a_second
+    seconds += host.beside if choice.layout == "data" else 0.0
     return seconds * (10.0 if choice.text > TEXT_LIMIT else 1.0)
 
 

@@ -298,14 +298,15 @@ class _Packer:
     ) -> tuple[list[tuple[int, int]], Layer]:
         """The numbers of a layer with their bits, and the layer that they say."""
         ranges, coder = self.ranges, _Coder()
-        falloff = coder.root(layer.falloff, ranges.falloff, precision.falloff)
-        opacity = coder.linear(layer.opacity, ranges.opacity, precision.opacity)
-        smoothness = 0.0
         if len(self.kinds) > 1:
             coder.whole(self.kinds.index(layer.kind), KIND_BITS)
         if self.unions:
             coder.whole(len(layer.shapes) - 1, UNION_BITS)
-            smoothness = coder.root(layer.smoothness, ranges.smoothness, precision.falloff)
+        falloff = coder.root(layer.falloff, ranges.falloff, precision.falloff)
+        opacity = coder.linear(layer.opacity, ranges.opacity, precision.opacity)
+        smoothness = (
+            coder.root(layer.smoothness, ranges.smoothness, precision.falloff) if self.unions else 0.0
+        )
         shapes = [self._shape(shape, cells, count, precision, coder) for shape in layer.shapes]
         return coder.numbers, Layer(tuple(shapes), falloff, opacity, smoothness)
 
@@ -495,22 +496,29 @@ class PackedText:
         place = 4 * CELL_BITS + CHOICE_BITS
         fields: dict[str, str | int] = {}
 
-        def text(width: int) -> str:
+        def head(width: int) -> str:
+            """A whole number in the first word."""
             nonlocal place
             place += width
-            return f"start + {place - width}, {width}"
+            return f"head >> {place - width} & {(1 << width) - 1}"
 
         def part(width: int) -> Expr:
-            return var(f"part({text(width)})")
+            nonlocal place
+            place += width
+            return var(f"part(start + {place - width}, {width})")
 
+        if len(self.kinds) > 1:
+            fields["kind"] = head(KIND_BITS)
+        if self.unions:
+            fields["count"] = head(UNION_BITS)
+        assert place <= WORD
         fields["falloff"] = self._say(squared(part(bits.falloff), ranges.falloff))
         fields["opacity"] = self._say(linear(part(bits.opacity), ranges.opacity))
-        if len(self.kinds) > 1:
-            fields["kind"] = text(KIND_BITS)
         if self.unions:
-            fields["count"] = text(UNION_BITS)
             fields["smoothness"] = self._say(squared(part(bits.falloff), ranges.smoothness))
-        return fields | {"head": place, "size": self._shape_bits()}
+        most = max(map(fraction_count, self.kinds), default=1)
+        longest = WORD + place + 3 * bits.color + most * (self.packed.least + 2**CHOICE_BITS - 1)
+        return fields | {"head": place, "size": self._shape_bits(), "window": -(-longest // WORD) + 1}
 
     def _say(self, value: Expr) -> str:
         return expression(value, self.dialect)

@@ -20,6 +20,7 @@ from ..blend import (
     display,
     grid_point,
     smooth_union,
+    surface_point,
     union_distance,
     union_weight,
 )
@@ -31,7 +32,19 @@ from ..shapes import KINDS
 from ..templating import template
 from . import packing
 from .constants import constants
-from .layouts import FILE, MODULE, OLD, PASTED, TEXT_LIMIT, Choice, Host, best_data_tiles, best_tiles, choose
+from .layouts import (
+    EMBEDDED,
+    FILE,
+    MODULE,
+    OLD,
+    PASTED,
+    TEXT_LIMIT,
+    Choice,
+    Host,
+    best_data_tiles,
+    best_tiles,
+    choose,
+)
 from .options import GLSL_VERSIONS, Options
 from .records import Form, P, first_records, form_of, records
 from .tiles import COARSEST, Tiles
@@ -50,12 +63,15 @@ class Target:
     dialect: Dialect
     host: Host
     time: str = ""  # what holds the seconds, where shapes can move
+    surface: str = ""  # what holds the place on a mesh, 0..1 with y down, where there is no canvas
 
 
 TARGETS = {
     "glsl": Target("glsl.jinja", GLSL, FILE),
     "shadertoy": Target("shadertoy.jinja", GLSL, PASTED, time="iTime"),
     "wgsl": Target("wgsl.jinja", WGSL, MODULE),
+    "three": Target("three.js.jinja", GLSL, EMBEDDED, surface="place"),
+    "godot": Target("godot.jinja", GLSL, OLD, surface="UV"),
 }
 
 
@@ -100,9 +116,16 @@ def shader(scene: Scene, name: str, options: Options) -> Shader:
         version=GLSL_VERSIONS[options.glsl],
         output="gl_FragColor" if options.glsl == "es100" else "fragColor",
         motion=_motion(target, options),
+        place=expression(surface_point(var(target.surface, VEC2), _size(scene)), target.dialect),
         **(dict.fromkeys(("table", "packed", "tiles", "data")) | {"layers": []} | parts),
     )
-    return Shader(text, choice, data, error)
+    return Shader(_dense(text) if choice.layout == "packed" else text, choice, data, error)
+
+
+def _dense(text: str) -> str:
+    """Half as much indentation, no empty lines."""
+    lines = (line for line in text.splitlines() if line)
+    return "".join(f"{' ' * ((len(line) - len(line.lstrip())) // 2)}{line.lstrip()}\n" for line in lines)
 
 
 def files_beside(made: Shader, suffix: str) -> dict[str, bytes]:
@@ -153,15 +176,19 @@ class _Job:
 
     def functions(self, roots: Iterable[Expr]) -> str:
         """Definitions of all functions that the formulas and the frame around them call."""
-        place, pixel_size = FRAMINGS[self.options.framing]
-        resolution, size = var("resolution", VEC2), var("size", VEC2)
-        frame = [display(BELOW), place(P, resolution, size), pixel_size(resolution, size)]
         moving = [breath(PIXEL, PIXEL)] if self.slack else []
-        found = used_functions([*roots, *moving, *frame])
+        found = used_functions([*roots, *moving, display(BELOW), *self._frame()])
         brief = self.choice.layout == "packed"
         return ("\n" if brief else "\n\n").join(
             definition(f, self.dialect, documented=not brief) for f in found
         )
+
+    def _frame(self) -> list[Expr]:
+        """From a pixel, or a place on a surface, to a point."""
+        if self.target.surface:
+            return [surface_point(P, P)]
+        place, pixel_size = FRAMINGS[self.options.framing]
+        return [place(P, P, P), pixel_size(P, P)]
 
 
 def _size(scene: Scene) -> Expr:
@@ -237,7 +264,12 @@ def _data(job: _Job) -> dict[str, Any]:
     return _loop(job, form, tiles) | {
         "table": _table_part(job, form),
         "tiles": _grid_part(job, tiles),
-        "data": {"width": DATA_WIDTH, "height": len(array), "lists": len(rows)},
+        "data": {
+            "width": DATA_WIDTH,
+            "height": len(array),
+            "lists": len(rows),
+            "base64": base64.b64encode(array.astype("<f4").tobytes()).decode(),
+        },
         "array": array,
     }
 
