@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 from ..errors import Sdf2vecError
 from ..scene import Scene, dumps
-from . import page, raster, shader, svg
+from . import component, page, raster, shader, svg
 from .options import Options
 
 
@@ -59,6 +59,9 @@ EXPORTERS: dict[str, Exporter] = {
     "data-uri": Exporter(".uri.txt", svg.data_uri, "that SVG as a data URI", svg.notes),
     "pdf": Exporter(".pdf", svg.pdf, "the portable SVG as PDF, by CairoSVG"),
     "html": Exporter(".html", page.html, "one page without dependencies: shader, drawing, copy buttons"),
+    "component": Exporter(
+        ".sdf-image.js", component.component, "<sdf-image>, an element that shows scene files"
+    ),
     "json": Exporter(".scene.json", _json, "the scene itself"),
     "png": Exporter(".render.png", raster.png, "the render, at any --size"),
 }

@@ -84,15 +84,20 @@ def _record(layer: Layer, shape: Shape, form: Form) -> list[float]:
     return [*row, *_tabulated(shape.kind).values(shape)]
 
 
+def record_scalars(kind: str) -> list[Expr]:
+    """The numbers of a record after its head, as expressions of the kind's scalars."""
+    return _tabulated(kind).scalars
+
+
 class _Tabulated:
     """A kind's distance with all that does not depend on the point read from a record."""
 
     def __init__(self, kind: str) -> None:
         self._symbolic = KINDS[kind].distance(P, *KINDS[kind].variables())
         self._parts = hoist(self._symbolic, P)
-        self._scalars = [scalar for part in self._parts for scalar in scalarize(part)]
+        self.scalars = [scalar for part in self._parts for scalar in scalarize(part)]
         self._inputs = KINDS[kind].scalars()
-        self.width = len(self._scalars)
+        self.width = len(self.scalars)
 
     def distance(self, start: int) -> Expr:
         """The distance, its numbers from place `start` of a record on."""
@@ -102,7 +107,7 @@ class _Tabulated:
     def values(self, shape: Shape) -> list[float]:
         """The numbers of a shape's record."""
         values = dict(zip(self._inputs, map(const, shape.parameters), strict=True))
-        return [constant(substitute(scalar, values)) for scalar in self._scalars]
+        return [constant(substitute(scalar, values)) for scalar in self.scalars]
 
 
 @cache

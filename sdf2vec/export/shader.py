@@ -304,8 +304,9 @@ def _grid_part(job: _Job, tiles: Tiles) -> dict[str, Any]:
     low, cells = vec2(*map(const, grid.low)), vec2(const(grid.per_unit))
     return {
         "columns": grid.columns,
-        "rows": grid.rows,
-        "cells": grid.cells,
+        "last_column": grid.columns - 1,
+        "last_row": grid.rows - 1,
+        "after": grid.cells + 1,
         "place": expression(grid_point(P, low, cells), job.dialect),
         "coarsest": literal(COARSEST),
     }
