@@ -17,7 +17,7 @@ PIP := $(BIN)/python -m pip --disable-pip-version-check
 
 # Software OpenGL and Vulkan, Khronos' GLSL compiler, cairo for the PDF export, librsvg and two browsers.
 ENGINES := libegl1 libegl-mesa0 libgl1 libgl1-mesa-dri libgbm1 libgles2 mesa-vulkan-drivers libvulkan1 \
-           glslang-tools libcairo2 librsvg2-bin chromium firefox-esr
+           glslang-tools libcairo2 librsvg2-bin chromium firefox-esr npm
 
 .DEFAULT_GOAL := demo
 .PHONY: demo test bench lint format engines clean distclean
@@ -25,7 +25,7 @@ ENGINES := libegl1 libegl-mesa0 libgl1 libgl1-mesa-dri libgbm1 libgles2 mesa-vul
 demo: $(VENV)/.installed
 	$(BIN)/sdf2vec examples/coffee.png --shapes 64 --seed 0 --emit json,glsl,shadertoy,wgsl,svg,png -o out/demo
 
-test: engines lint
+test: engines $(VENV)/.installed-clients lint
 	$(BIN)/python -m pytest
 
 lint: $(VENV)/.installed-test
@@ -75,4 +75,12 @@ $(VENV)/.installed: pyproject.toml $(VENV)/.torch
 
 $(VENV)/.installed-test: pyproject.toml $(VENV)/.torch
 	$(PIP) install -e '.[test]'
+	@touch $@
+
+# What shader exports are tried in: a Shadertoy client in an environment of its own (it wants another wgpu), three.js.
+$(VENV)/.installed-clients: Makefile $(VENV)/.torch | engines
+	$(BIN)/python -m venv $(VENV)/shadertoy
+	$(VENV)/shadertoy/bin/python -m pip --disable-pip-version-check install wgpu-shadertoy==0.2.0 wgpu==0.23.0
+	mkdir -p $(VENV)/npm
+	if command -v npm >/dev/null; then npm install --silent --no-audit --no-fund --prefix $(VENV)/npm three@0.170.0; fi
 	@touch $@

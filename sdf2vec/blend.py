@@ -24,6 +24,7 @@ from .expr import (
     minimum,
     mix,
     sigmoid,
+    sin,
     vec4,
 )
 
@@ -126,10 +127,14 @@ def display(color: Expr) -> Expr:
 # --- the canvas ---------------------------------------------------------------------------------------------
 
 
+def _units(resolution: Expr, size: Expr) -> Expr:
+    return let("units", size / resolution)
+
+
 @function("pixelSize", resolution=VEC2, size=VEC2)
 def pixel_size(resolution: Expr, size: Expr) -> Expr:
     """Scene units per pixel such that a scene of this size fits into the canvas."""
-    units = let("units", size / resolution)
+    units = _units(resolution, size)
     return maximum(units.x, units.y)
 
 
@@ -137,3 +142,43 @@ def pixel_size(resolution: Expr, size: Expr) -> Expr:
 def scene_point(pixel: Expr, resolution: Expr, size: Expr) -> Expr:
     """The scene's point at a pixel position (y down, centres at half-integers); the origin is the middle."""
     return (pixel - 0.5 * resolution) * pixel_size(resolution, size)
+
+
+@function("pixelSize", resolution=VEC2, size=VEC2)
+def covering_pixel_size(resolution: Expr, size: Expr) -> Expr:
+    """Scene units per pixel such that a scene of this size covers the canvas."""
+    units = _units(resolution, size)
+    return minimum(units.x, units.y)
+
+
+@function("scenePoint", pixel=VEC2, resolution=VEC2, size=VEC2)
+def covering_scene_point(pixel: Expr, resolution: Expr, size: Expr) -> Expr:
+    """The scene's point at a pixel position (y down, centres at half-integers); the origin is the middle."""
+    return (pixel - 0.5 * resolution) * covering_pixel_size(resolution, size)
+
+
+# How a scene meets a canvas of another shape: the point and the size of a pixel.
+FRAMINGS = {"fit": (scene_point, pixel_size), "cover": (covering_scene_point, covering_pixel_size)}
+
+
+@function("surfacePoint", uv=VEC2, size=VEC2)
+def surface_point(uv: Expr, size: Expr) -> Expr:
+    """The scene's point at a place 0..1 of a surface (y down) that it fills."""
+    return (uv - 0.5) * size
+
+
+@function("gridPoint", p=VEC2, low=VEC2, cells=VEC2)
+def grid_point(p: Expr, low: Expr, cells: Expr) -> Expr:
+    """p in a grid that begins at low and has so many cells a unit."""
+    return (p - low) * cells
+
+
+# --- motion -------------------------------------------------------------------------------------------------
+
+BREATH = 0.004  # scene units
+
+
+@function("breath", time=FLOAT, index=FLOAT)
+def breath(time: Expr, index: Expr) -> Expr:
+    """How far a shape has drawn in its edge at a time in seconds, each at its own pace."""
+    return BREATH * sin(time * (1.0 + 0.3 * sin(index)) + index)

@@ -10,19 +10,20 @@ import sys
 import time
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from types import FrameType
 from typing import TYPE_CHECKING, Any, BinaryIO, Literal, NoReturn
 
 from . import __version__, api
+from .blend import FRAMINGS
 from .errors import Sdf2vecError
-from .export import EXPORTERS, export
+from .export import EXPORTERS, beside, export
 from .export.options import GLSL_VERSIONS, LAYOUTS, SVG_PROFILES, Options
 from .files import one_line, require_writable, write_atomically
 from .fit.presets import DEFAULT, PRESETS
 from .fit.settings import DEVICES, LOSS_NAMES, settings_of
-from .image import Picture, load
+from .image import Picture, encode_png, load
 from .scene import Scene
 from .scene import load as load_scene
 from .scene import loads as loads_scene
@@ -84,6 +85,9 @@ def _convert_parser() -> argparse.ArgumentParser:
     _add_output(parser)
     _add_settings(parser.add_argument_group("fit"))
     _add_options(parser)
+    parser.add_argument(
+        "--with-original", action="store_true", help="a page also holds the picture and a slider to compare"
+    )
     parser.add_argument("--quiet", action="store_true", help="print errors only")
     parser.add_argument("--version", action="version", version=f"sdf2vec {__version__}")
     return parser
@@ -133,6 +137,7 @@ def _add_emit(parser: argparse.ArgumentParser, default: str) -> None:
     listed = "; ".join(f"{name}: {exporter.about}" for name, exporter in EXPORTERS.items())
     parser.add_argument(
         "--emit",
+        "--target",
         action="append",
         metavar="TARGETS",
         help=f"what to write, separated by commas (default: {default}). {listed}",
@@ -153,6 +158,10 @@ def _add_options(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--glsl", default="es300", help=f"GLSL version: {', '.join(GLSL_VERSIONS)}")
     parser.add_argument("--layout", default="auto", help=f"how shaders hold shapes: {', '.join(LAYOUTS)}")
     parser.add_argument(
+        "--framing", default="fit", help=f"on a canvas of another shape, shaders: {', '.join(FRAMINGS)}"
+    )
+    parser.add_argument("--animate", action="store_true", help="the shapes of a Shadertoy breathe")
+    parser.add_argument(
         "--svg-profile",
         default=SVG_PROFILES[0],
         help=f"{' or '.join(SVG_PROFILES)}: with blur filters (default), or without, for every renderer",
@@ -162,10 +171,12 @@ def _add_options(parser: argparse.ArgumentParser) -> None:
     )
 
 
-def _export_options(options: argparse.Namespace, title: str = "a picture") -> Options:
+def _export_options(options: argparse.Namespace) -> Options:
     """What the user chose about exports. Raises Sdf2vecError for impossible choices."""
-    names = ("size", "glsl", "layout", "svg_profile", "svg_size_limit")
-    return Options(title=title, **{name: getattr(options, name) for name in names if hasattr(options, name)})
+    return Options(**{name: getattr(options, name) for name in EXPORT_OPTIONS if hasattr(options, name)})
+
+
+EXPORT_OPTIONS = ("size", "glsl", "layout", "framing", "animate", "svg_profile", "svg_size_limit")
 
 
 @dataclass(frozen=True)
@@ -223,7 +234,8 @@ def _convert_one(job: _Job, options: argparse.Namespace) -> bool:
         early = ", stopped early" if stop.requested else ""
         size = f"{picture.width} x {picture.height}"
         say(f"{_name(job.source)}: {size}, {scene.shape_count} shapes, {quality}, {seconds:.1f} s{early}")
-        _write_exports(scene, job, options, say)
+        original = encode_png(picture.pixels) if options.with_original else None
+        _write_exports(scene, job, options, say, original)
         return stop.requested
 
 
@@ -259,17 +271,34 @@ def _name(source: str) -> str:
     return "standard input" if source == STREAM else source
 
 
-def _write_exports(scene: Scene, job: _Job, options: argparse.Namespace, say: Callable[[str], None]) -> None:
+def _write_exports(
+    scene: Scene,
+    job: _Job,
+    options: argparse.Namespace,
+    say: Callable[[str], None],
+    original: bytes | None = None,
+) -> None:
     title = "a picture" if job.source == STREAM else one_line(_stem(job.source))
-    chosen = _export_options(options, title)
+    chosen = _export_options(options)
     for target, path in job.outputs.items():
-        data = export(scene, target, chosen)
+        made = replace(chosen, title=title, alone=path == STREAM, original=original)
+        data = export(scene, target, made)
         raw = data.encode() if isinstance(data, str) else data
         _write(path, raw)
         if path != STREAM:
-            say(f"  {path}: {len(raw):,} bytes{_packed(target, raw)}{_figure(scene, target, data, chosen)}")
-        for note in EXPORTERS[target].notes(scene, chosen):
+            say(f"  {path}: {len(raw):,} bytes{_packed(target, raw)}{_figure(scene, target, data, made)}")
+            _write_beside(path, scene, target, made, say)
+        for note in EXPORTERS[target].notes(scene, made):
             say(f"  {note}")
+
+
+def _write_beside(path: str, scene: Scene, target: str, made: Options, say: Callable[[str], None]) -> None:
+    """Files that belong to an export, named after it."""
+    suffix = EXPORTERS[target].suffix
+    for ending, data in beside(scene, target, made).items():
+        place = path.removesuffix(suffix) + ending if path.endswith(suffix) else path + ending[len(suffix) :]
+        write_atomically(place, data)
+        say(f"  {place}: {len(data):,} bytes")
 
 
 def _packed(target: str, data: bytes) -> str:

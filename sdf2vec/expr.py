@@ -195,7 +195,7 @@ class Cell:
 class Operation:
     """One row: types, spelling per target, value on constants, derivative.
 
-    A row either has `torch`, `numba`, `triton`, `value` and `partials` (it works on floats; vectors go by
+    A row either has a text for every target, `value` and `partials` (it works on floats; vectors go by
     component) or `expand` (other rows define it once its arguments are split into components).
     """
 
@@ -205,6 +205,7 @@ class Operation:
     torch: str | None = None
     numba: str | None = None
     triton: str | None = None
+    javascript: str | None = None
     value: Callable[..., float] | None = None
     partials: Callable[..., tuple[Operand | None, ...]] | None = None
     expand: Callable[..., tuple[Expr, ...]] | None = None
@@ -317,6 +318,7 @@ OPERATIONS: dict[str, Operation] = {
         torch="{0} + {1}",
         numba="{0} + {1}",
         triton="{0} + {1}",
+        javascript="{0} + {1}",
         value=lambda a, b: a + b,
         partials=lambda a, b, y: (1.0, 1.0),
     ),
@@ -326,6 +328,7 @@ OPERATIONS: dict[str, Operation] = {
         torch="{0} - {1}",
         numba="{0} - {1}",
         triton="{0} - {1}",
+        javascript="{0} - {1}",
         value=lambda a, b: a - b,
         partials=lambda a, b, y: (1.0, -1.0),
     ),
@@ -335,6 +338,7 @@ OPERATIONS: dict[str, Operation] = {
         torch="{0} * {1}",
         numba="{0} * {1}",
         triton="{0} * {1}",
+        javascript="{0} * {1}",
         value=lambda a, b: a * b,
         partials=lambda a, b, y: (b, a),
     ),
@@ -344,6 +348,7 @@ OPERATIONS: dict[str, Operation] = {
         torch="{0} / {1}",
         numba="{0} / {1}",
         triton="{0} / {1}",
+        javascript="{0} / {1}",
         value=lambda a, b: a / b,
         partials=lambda a, b, y: (1.0 / b, -(y / b)),
         domain="divisor not 0: whoever divides keeps it away from 0",
@@ -354,6 +359,7 @@ OPERATIONS: dict[str, Operation] = {
         torch="-{0}",
         numba="-{0}",
         triton="-{0}",
+        javascript="-{0}",
         value=lambda a: -a,
         partials=lambda a, y: (-1.0,),
     ),
@@ -363,6 +369,7 @@ OPERATIONS: dict[str, Operation] = {
         torch="torch.where({0} < 0, -{0}, {0})",
         numba="({0} if {0} > ZERO else -{0})",
         triton="tl.abs({0})",
+        javascript="Math.abs({0})",
         value=abs,
         partials=lambda a, y: (select(a < 0.0, -1.0, 1.0),),
     ),
@@ -372,6 +379,7 @@ OPERATIONS: dict[str, Operation] = {
         torch="torch.where({0} < {1}, {0}, {1})",
         numba="({0} if {0} < {1} else {1})",
         triton="tl.minimum({0}, {1})",
+        javascript="Math.min({0}, {1})",
         value=min,
         partials=lambda a, b, y: (select(a < b, 1.0, 0.0), select(a < b, 0.0, 1.0)),
     ),
@@ -381,6 +389,7 @@ OPERATIONS: dict[str, Operation] = {
         torch="torch.where({0} > {1}, {0}, {1})",
         numba="({0} if {0} > {1} else {1})",
         triton="tl.maximum({0}, {1})",
+        javascript="Math.max({0}, {1})",
         value=max,
         partials=lambda a, b, y: (select(a > b, 1.0, 0.0), select(a > b, 0.0, 1.0)),
     ),
@@ -391,6 +400,7 @@ OPERATIONS: dict[str, Operation] = {
         torch=_SQRT,
         numba="sqrt({0} if {0} > ZERO else ZERO)",
         triton="tl.sqrt(tl.maximum({0}, 0.0))",
+        javascript="Math.sqrt(Math.max({0}, 0))",
         value=lambda a: math.sqrt(max(a, 0.0)),
         partials=lambda a, y: (select(a > 0.0, 0.5 / y, 0.0),),
         domain="not below 0; the derivative at 0 is 0",
@@ -401,6 +411,7 @@ OPERATIONS: dict[str, Operation] = {
         torch="torch.exp({0})",
         numba="fast_exp({0})",
         triton="tl.exp({0})",
+        javascript="Math.exp({0})",
         value=math.exp,
         partials=lambda a, y: (y,),
         domain="at most 80, so that float32 holds it",
@@ -411,6 +422,7 @@ OPERATIONS: dict[str, Operation] = {
         torch="torch.log(torch.where({0} > 1e-30, {0}, 1e-30))",
         numba="log({0} if {0} > LEAST else LEAST)",
         triton="tl.log(tl.maximum({0}, 1e-30))",
+        javascript="Math.log(Math.max({0}, 1e-30))",
         value=lambda a: math.log(max(a, 1e-30)),
         partials=lambda a, y: (select(a > 1e-30, 1.0 / a, 0.0),),
         domain="below 1e-30 it stays what it is there",
@@ -421,6 +433,7 @@ OPERATIONS: dict[str, Operation] = {
         torch="torch.sin({0})",
         numba="fast_sin({0})",
         triton="tl.sin({0})",
+        javascript="Math.sin({0})",
         value=math.sin,
         partials=lambda a, y: (cos(a),),
         domain="a few hundred radians, beyond which float32 loses the phase",
@@ -431,6 +444,7 @@ OPERATIONS: dict[str, Operation] = {
         torch="torch.cos({0})",
         numba="fast_sin({0} + QUARTER)",
         triton="tl.cos({0})",
+        javascript="Math.cos({0})",
         value=math.cos,
         partials=lambda a, y: (-sin(a),),
         domain="a few hundred radians, beyond which float32 loses the phase",
@@ -441,6 +455,7 @@ OPERATIONS: dict[str, Operation] = {
         torch="torch.sigmoid({0})",
         numba="fast_sigmoid({0})",
         triton="1.0 / (1.0 + tl.exp(tl.minimum(-{0}, 80.0)))",
+        javascript="1 / (1 + Math.exp(Math.min(-{0}, 80)))",
         value=_sigmoid,
         partials=lambda a, y: (y * (1.0 - y),),
     ),
@@ -450,6 +465,7 @@ OPERATIONS: dict[str, Operation] = {
         torch="{0} < {1}",
         numba="{0} < {1}",
         triton="{0} < {1}",
+        javascript="{0} < {1}",
         value=lambda a, b: float(a < b),
         partials=lambda a, b, y: (None, None),
     ),
@@ -460,6 +476,7 @@ OPERATIONS: dict[str, Operation] = {
         torch="torch.where({0}, {1}, {2})",
         numba="({1} if {0} else {2})",
         triton="tl.where({0}, {1}, {2})",
+        javascript="({0} ? {1} : {2})",
         value=lambda condition, a, b: a if condition else b,
         partials=lambda condition, a, b, y: (None, select(condition, 1.0, 0.0), select(condition, 0.0, 1.0)),
     ),
@@ -469,6 +486,7 @@ OPERATIONS: dict[str, Operation] = {
         torch="{0}.detach()",
         numba="{0}",
         triton="{0}",
+        javascript="{0}",
         value=lambda a: a,
         partials=lambda a, y: (None,),
         domain="its derivative counts as 0",

@@ -13,6 +13,7 @@ from .engines import ENGINES, EngineError
 from .errors import Sdf2vecError
 from .export import export
 from .export.options import SVG_PROFILES, Options
+from .export.shader import TARGETS, shader
 from .image import fitted_size, premultiply
 from .render.reference import render
 from .scene import Scene
@@ -60,7 +61,7 @@ class RoundTrip:
 
     target: str
     engine: str
-    draw: Callable[[str, int, int], Pixels]
+    draw: Callable[[str, int, int, Pixels | None], Pixels]
     any_shape: bool = True
     options: Options = field(default_factory=Options)
     note: str = ""
@@ -71,7 +72,9 @@ class RoundTrip:
 
 
 def check(
-    scene: Scene, targets: Iterable[str] | None = None, sizes: Sequence[Size] | None = None
+    scene: Scene,
+    targets: Iterable[str] | None = None,
+    sizes: Sequence[Size] | None = None,
 ) -> list[Check]:
     """Re-renders the exports on every engine that is present. Sizes are (width, height) in pixels.
 
@@ -108,9 +111,8 @@ def _check_trip(scene: Scene, trip: RoundTrip, sizes: Sequence[Size]) -> list[Ch
     if reason:
         return [Check(trip.name, trip.engine, missing=reason)]
     try:
-        text = export(scene, trip.target, trip.options)
-        assert isinstance(text, str)
-        return [compare(trip, text, scene, size) for size in sizes]
+        text, data = _exported(scene, trip.target, trip.options)
+        return [compare(trip, text, scene, size, data) for size in sizes]
     except EngineError:
         raise
     except Sdf2vecError as error:
@@ -118,20 +120,36 @@ def _check_trip(scene: Scene, trip: RoundTrip, sizes: Sequence[Size]) -> list[Ch
 
 
 def figure(scene: Scene, target: str, data: str | bytes, options: Options) -> Check | None:
-    """An export at the fitted size on the first engine that draws it; None where none is here."""
+    """An export at the fitted size on the first engine that draws it; None where none is here.
+
+    None too for one that shows something else than the render: a moving or a cropped picture.
+    """
+    if options.animate or options.framing != "fit" or not isinstance(data, str):
+        return None
     for trip in ROUND_TRIPS.get(target, ()):
         suits = trip.target != "svg" or trip.options.svg_profile == options.svg_profile
-        if suits and isinstance(data, str) and not ENGINES[trip.engine].missing():
-            return compare(trip, data, scene, default_sizes(scene, trip)[0])
+        if suits and not ENGINES[trip.engine].missing():
+            beside = _exported(scene, target, options)[1] if target in TARGETS else None
+            return compare(trip, data, scene, default_sizes(scene, trip)[0], beside)
     return None
 
 
-def compare(trip: RoundTrip, text: str, scene: Scene, size: Size) -> Check:
-    """One export drawn at one size, against the torch render in float64."""
+def _exported(scene: Scene, target: str, options: Options) -> tuple[str, Pixels | None]:
+    """An export's text, and the data beside it."""
+    if target in TARGETS:
+        made = shader(scene, target, options)
+        return made.text, made.data
+    text = export(scene, target, options)
+    assert isinstance(text, str)
+    return text, None
+
+
+def compare(trip: RoundTrip, text: str, scene: Scene, size: Size, data: Pixels | None = None) -> Check:
+    """One export (and the data beside it) drawn at one size, against the torch render in float64."""
     import torch
 
     width, height = size
-    drawn = trip.draw(text, width, height)
+    drawn = trip.draw(text, width, height, data)
     expected = render(scene, width, height, dtype=torch.float64).permute(1, 2, 0).numpy()
     difference = 255.0 * (drawn.astype(np.float64) - expected)
     error = float(np.mean(difference**2))
@@ -149,23 +167,25 @@ def compare(trip: RoundTrip, text: str, scene: Scene, size: Size) -> Check:
 # --- drawing -----------------------------------------------------------------------------------------------
 
 
-def _draw_glsl(text: str, width: int, height: int) -> Pixels:
-    return ENGINES["opengl"].render(text, width, height, uniforms={"resolution": (width, height)})
+def _draw_glsl(text: str, width: int, height: int, data: Pixels | None) -> Pixels:
+    uniforms = {"resolution": (width, height)}
+    return ENGINES["opengl"].render(text, width, height, uniforms=uniforms, texture=data)
 
 
-def _draw_shadertoy(text: str, width: int, height: int) -> Pixels:
+def _draw_shadertoy(text: str, width: int, height: int, data: Pixels | None) -> Pixels:
     whole = SHADERTOY_HEAD + text + SHADERTOY_TAIL
     return ENGINES["opengl"].render(whole, width, height, uniforms={"iResolution": (width, height, 1.0)})
 
 
-def _draw_wgsl(text: str, width: int, height: int) -> Pixels:
-    return ENGINES["webgpu"].render(text, width, height, uniforms={"resolution": (width, height)})
+def _draw_wgsl(text: str, width: int, height: int, data: Pixels | None) -> Pixels:
+    uniforms = {"resolution": (width, height)}
+    return ENGINES["webgpu"].render(text, width, height, uniforms=uniforms, texture=data)
 
 
 def _drawing(engine: str, profile: str) -> RoundTrip:
     """An SVG of one profile on one engine."""
 
-    def draw(text: str, width: int, height: int) -> Pixels:
+    def draw(text: str, width: int, height: int, data: Pixels | None) -> Pixels:
         return premultiply(ENGINES[engine].render(text, width, height))
 
     note = profile if profile != SVG_PROFILES[0] else ""
@@ -177,6 +197,7 @@ SHADERTOY_HEAD = """#version 300 es
 precision highp float;
 precision highp int;
 uniform vec3 iResolution;
+uniform float iTime;
 out vec4 shadertoy_out_color;
 """
 SHADERTOY_TAIL = """

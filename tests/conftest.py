@@ -5,9 +5,13 @@ from collections.abc import Callable
 
 import pytest
 
-from sdf2vec.engines import ENGINES, glslang
+from sdf2vec.engines import ENGINES, glslang, shadertoy, threejs
 
-MISSING = {name: engine.missing for name, engine in ENGINES.items()} | {"glslang": glslang.missing}
+MISSING = {name: engine.missing for name, engine in ENGINES.items()} | {
+    "glslang": glslang.missing,
+    "shadertoy": shadertoy.missing,
+    "three": threejs.missing,
+}
 
 
 @pytest.fixture

@@ -210,7 +210,7 @@ def test_export_options_have_the_words_of_the_command_line():
     with Image.open(io.BytesIO(_bytes(scene.to("png", size=32)))) as png:
         assert png.size == (48, 32)
     assert str(scene.to("glsl", glsl="330")).startswith("#version 330")
-    assert "vec4 table[" in str(scene.to("glsl", layout="table"))
+    assert "vec4 table0[" in str(scene.to("glsl", layout="table"))
     assert "<title>my cat</title>" in str(sdf2vec.export(scene, "svg", title="my cat"))
 
 
@@ -219,7 +219,7 @@ def test_export_options_have_the_words_of_the_command_line():
     [
         ("pdf2", {}, "unknown target 'pdf2'; choose from glsl"),
         ("", {}, "unknown target ''"),
-        ("glsl", {"glsl": "100"}, "unknown GLSL version '100'"),
+        ("glsl", {"glsl": "110"}, "unknown GLSL version '110'"),
         ("glsl", {"layout": "loose"}, "unknown layout 'loose'"),
         ("png", {"size": 0}, "size must be between 1 and 16384 pixels, got 0"),
         ("png", {"size": 16384}, "png: 24576 x 16384 is more than 200 megapixels"),

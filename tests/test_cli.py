@@ -141,7 +141,8 @@ def test_the_summary_says_how_an_engine_draws_it(folder, run, require_engine):
     require_engine("opengl")
     out = run("photo.jpg", *SHORT).out.decode()
     figure = re.search(
-        r"photo\.glsl: .* bytes; opengl draws it at ([\d.]+) dB, largest error (\S+) levels", out
+        r"photo\.glsl: .* bytes; layout readable; opengl draws it at ([\d.]+) dB, largest error (\S+) levels",
+        out,
     )
     assert figure
     assert float(figure[1]) > 80
@@ -244,7 +245,7 @@ def test_same_seed_same_bytes(folder, run):
         (["photo.jpg", "--loss", "l1:0.8,ssim:"], ["name:weight", "'ssim:'"]),
         (["photo.jpg", "--loss", "l1:0.8,flip:-1"], ["'flip'", "got -1"]),
         (["photo.jpg", "--compositing", "multiply"], ["unknown compositing 'multiply'", "additive"]),
-        (["photo.jpg", "--glsl", "100"], ["unknown GLSL version '100'", "es300"]),
+        (["photo.jpg", "--glsl", "110"], ["unknown GLSL version '110'", "es300"]),
         (["photo.jpg", "--layout", "loose"], ["unknown layout 'loose'"]),
         (["photo.jpg", "--shapes", "0"], ["shapes", "got 0"]),
         (["photo.jpg", "--shapes", "-3"], ["shapes", "got -3"]),
@@ -485,7 +486,7 @@ def test_check_prints_a_table(folder, run, scene_file, require_engine):
 def test_check_says_what_differs(folder, run, scene_file, monkeypatch, require_engine):
     require_engine("opengl")
 
-    def white(text, width, height, uniforms):
+    def white(text, width, height, uniforms, texture):
         return np.ones((height, width, 4), np.float32)
 
     monkeypatch.setitem(ENGINES, "opengl", replace(ENGINES["opengl"], render=white))

@@ -1,6 +1,7 @@
 """What the engines have in common: their record, their error and their checks."""
 
 from collections.abc import Callable, Mapping
+from contextlib import suppress
 from dataclasses import dataclass
 from xml.etree import ElementTree
 
@@ -49,6 +50,12 @@ def reason_missing(probe: Callable[[], object], advice: str) -> str | None:
     ) as error:  # a driver may fail in any way; the caller asked for a line, not for a traceback
         return f"{' '.join(str(error).split()) or type(error).__name__}; {advice}"
     return None
+
+
+def load_triton() -> None:
+    """Loads Triton where it is installed: its LLVM crashes when a Mesa driver has brought another one before."""
+    with suppress(ImportError):
+        import triton  # noqa: F401
 
 
 def require_present(reason: str | None) -> None:

@@ -13,6 +13,7 @@ from sdf2vec.engines.engine import (
     EngineError,
     Picture,
     Uniforms,
+    load_triton,
     reason_missing,
     require_drawable,
     require_present,
@@ -96,6 +97,7 @@ def _draw(context: Any, program: Any, size: tuple[int, int], on_release: Callabl
 def _context() -> Any:
     import moderngl
 
+    load_triton()
     settings: dict[str, Any] = {"backend": "egl"}
     return moderngl.create_context(standalone=True, **settings)
 

@@ -15,6 +15,7 @@ from sdf2vec.engines.engine import (
     EngineError,
     Picture,
     Uniforms,
+    load_triton,
     reason_missing,
     require_drawable,
     require_present,
@@ -183,6 +184,7 @@ def _summary(log: str) -> str:
 
 @cache
 def _device() -> Any:
+    load_triton()
     with _runtime_folder():
         import wgpu
 

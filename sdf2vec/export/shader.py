@@ -2,76 +2,197 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+import base64
+from collections.abc import Iterable
+from dataclasses import dataclass, replace
+from functools import lru_cache
 from typing import Any
 
+import numpy as np
+from numpy.typing import NDArray
+
 from ..blend import (
+    BREATH,
     COMPOSITING,
+    FRAMINGS,
+    breath,
     coverage,
     display,
-    pixel_size,
-    scene_point,
+    grid_point,
     smooth_union,
+    surface_point,
     union_distance,
     union_weight,
 )
-from ..expr import (
-    VEC2,
-    VEC4,
-    Expr,
-    component,
-    const,
-    constant,
-    hoist,
-    scalarize,
-    substitute,
-    var,
-    vec2,
-    vec3,
-    vec4,
-)
+from ..errors import Sdf2vecError
+from ..expr import VEC2, VEC4, Expr, const, var, vec2, vec3, vec4
 from ..lower.shader import GLSL, WGSL, Dialect, definition, expression, literal, statements, used_functions
 from ..scene import Layer, Scene, Shape
 from ..shapes import KINDS
 from ..templating import template
+from . import packing
 from .constants import constants
+from .layouts import (
+    EMBEDDED,
+    FILE,
+    MODULE,
+    OLD,
+    PASTED,
+    TEXT_LIMIT,
+    Choice,
+    Host,
+    best_data_tiles,
+    best_tiles,
+    choose,
+)
 from .options import GLSL_VERSIONS, Options
+from .records import Form, P, first_records, form_of, records
+from .tiles import COARSEST, Tiles
 
-MAX_READABLE = 256  # shapes; beyond, "auto" writes a table
+BELOW, PIXEL, D = var("c", VEC4), var("pixel"), var("d")
+DATA_WIDTH = 256  # texels in a row of a data texture
 
-P, BELOW, PIXEL = var("p", VEC2), var("c", VEC4), var("pixel")
-
-
-def glsl(scene: Scene, options: Options) -> str:
-    """A complete fragment shader with one uniform, `resolution`."""
-    return _render("glsl.jinja", GLSL, scene, options, version=GLSL_VERSIONS[options.glsl])
+Floats = NDArray[np.float32]
 
 
-def shadertoy(scene: Scene, options: Options) -> str:
-    """A `mainImage` that needs nothing but what Shadertoy supplies."""
-    return _render("shadertoy.jinja", GLSL, scene, options)
+@dataclass(frozen=True)
+class Target:
+    """A shader text: its template, dialect, and what may hold its shapes."""
+
+    template: str
+    dialect: Dialect
+    host: Host
+    time: str = ""  # what holds the seconds, where shapes can move
+    surface: str = ""  # what holds the place on a mesh, 0..1 with y down, where there is no canvas
 
 
-def wgsl(scene: Scene, options: Options) -> str:
-    """A WGSL module with the fragment entry point `fragment_main` and one uniform, `resolution`."""
-    return _render("wgsl.jinja", WGSL, scene, options)
+TARGETS = {
+    "glsl": Target("glsl.jinja", GLSL, FILE),
+    "shadertoy": Target("shadertoy.jinja", GLSL, PASTED, time="iTime"),
+    "wgsl": Target("wgsl.jinja", WGSL, MODULE),
+    "three": Target("three.js.jinja", GLSL, EMBEDDED, surface="place"),
+    "godot": Target("godot.jinja", GLSL, OLD, surface="UV"),
+}
 
 
-def _render(name: str, dialect: Dialect, scene: Scene, options: Options, **more: str) -> str:
-    # WGSL never gets a table: indexing a constant array by a variable hangs some of its compilers
-    table = dialect is GLSL and (
-        options.layout == "table" or (options.layout == "auto" and scene.shape_count > MAX_READABLE)
+@dataclass(frozen=True)
+class Shader:
+    """A shader text, how it holds its shapes, and the data beside it: [rows, DATA_WIDTH, 4] or None.
+
+    `error` is the largest difference from the scene's picture that the layout makes, in 8-bit levels.
+    """
+
+    text: str
+    choice: Choice
+    data: Floats | None = None
+    error: float = 0.0
+
+    @property
+    def about(self) -> str:
+        """One line on the layout, with a warning where a host may refuse the text."""
+        line = str(self.choice)
+        if self.error:
+            line += f", off by at most {self.error:.2f} levels"
+        if len(self.text) > TEXT_LIMIT:
+            line += f"; warning: more than {TEXT_LIMIT // 1024} KiB of text, which some hosts refuse"
+        return line
+
+
+@lru_cache(maxsize=16)
+def shader(scene: Scene, name: str, options: Options) -> Shader:
+    """A scene as a shader: `name` is a key of TARGETS. Raises Sdf2vecError for a layout that the target can't hold."""
+    target = TARGETS[name]
+    choice = choose(scene, options.layout, _host(target, options))
+    slack = BREATH if _moves(target, options) else 0.0
+    parts = _BODIES[choice.layout if scene.layers else "readable"](
+        _Job(scene, target, options, choice, slack)
     )
-    body = _table(scene) if table and scene.layers else _lines(scene, dialect)
-    size = vec2(*(const(side) for side in scene.extent))
-    return template(name).render(
+    data, error = parts.pop("array", None), parts.pop("error", 0.0)
+    text = template(target.template).render(
         scene=scene,
         title="".join(c if c.isprintable() and c != "\\" else " " for c in options.title),
-        size=expression(size, dialect),
-        background=expression(_background(scene), dialect),
-        **body,
-        **more,
+        size=expression(_size(scene), target.dialect),
+        background=expression(_background(scene), target.dialect),
+        version=GLSL_VERSIONS[options.glsl],
+        output="gl_FragColor" if options.glsl == "es100" else "fragColor",
+        motion=_motion(target, options),
+        place=expression(surface_point(var(target.surface, VEC2), _size(scene)), target.dialect),
+        **(dict.fromkeys(("table", "packed", "tiles", "data")) | {"layers": []} | parts),
     )
+    return Shader(_dense(text) if choice.layout == "packed" else text, choice, data, error)
+
+
+def _dense(text: str) -> str:
+    """Half as much indentation, no empty lines."""
+    lines = (line for line in text.splitlines() if line)
+    return "".join(f"{' ' * ((len(line) - len(line.lstrip())) // 2)}{line.lstrip()}\n" for line in lines)
+
+
+def files_beside(made: Shader, suffix: str) -> dict[str, bytes]:
+    """The data of a shader as little-endian float32, and as a JavaScript module, by suffix."""
+    if made.data is None:
+        return {}
+    raw = made.data.astype("<f4").tobytes()
+    module = template("data.js.jinja").render(
+        data=base64.b64encode(raw).decode(), rows=len(made.data), width=DATA_WIDTH
+    )
+    return {f"{suffix}.bin": raw, f"{suffix}.data.js": module.encode()}
+
+
+def _host(target: Target, options: Options) -> Host:
+    if target.dialect is GLSL and options.glsl == "es100" and target.host is FILE:
+        return OLD
+    if options.alone:
+        return replace(target.host, layouts=tuple(n for n in target.host.layouts if n != "data"))
+    return target.host
+
+
+def _moves(target: Target, options: Options) -> bool:
+    if options.animate and not target.time:
+        raise Sdf2vecError("only a Shadertoy can be animated; use --emit shadertoy")
+    return options.animate
+
+
+def _motion(target: Target, options: Options) -> str:
+    """What is added to a distance in a loop over shapes i."""
+    if not options.animate:
+        return ""
+    return f" + {expression(breath(var(target.time), var('float(i)')), target.dialect)}"
+
+
+@dataclass(frozen=True)
+class _Job:
+    """What the body of a shader is made from."""
+
+    scene: Scene
+    target: Target
+    options: Options
+    choice: Choice
+    slack: float
+
+    @property
+    def dialect(self) -> Dialect:
+        return self.target.dialect
+
+    def functions(self, roots: Iterable[Expr]) -> str:
+        """Definitions of all functions that the formulas and the frame around them call."""
+        moving = [breath(PIXEL, PIXEL)] if self.slack else []
+        found = used_functions([*roots, *moving, display(BELOW), *self._frame()])
+        brief = self.choice.layout == "packed"
+        return ("\n" if brief else "\n\n").join(
+            definition(f, self.dialect, documented=not brief) for f in found
+        )
+
+    def _frame(self) -> list[Expr]:
+        """From a pixel, or a place on a surface, to a point."""
+        if self.target.surface:
+            return [surface_point(P, P)]
+        place, pixel_size = FRAMINGS[self.options.framing]
+        return [place(P, P, P), pixel_size(P, P)]
+
+
+def _size(scene: Scene) -> Expr:
+    return vec2(*(const(side) for side in scene.extent))
 
 
 def _background(scene: Scene) -> Expr:
@@ -79,103 +200,161 @@ def _background(scene: Scene) -> Expr:
     return vec4(*(const(value) for value in values))
 
 
-def _definitions(roots: list[Expr], dialect: Dialect) -> str:
-    resolution, size = var("resolution", VEC2), var("size", VEC2)
-    frame = [display(BELOW), scene_point(P, resolution, size), pixel_size(resolution, size)]
-    return "\n\n".join(definition(function, dialect) for function in used_functions([*roots, *frame]))
+def _loop_roots(scene: Scene, unions: bool) -> list[Expr]:
+    """What a loop over shapes calls besides their distances."""
+    blend = COMPOSITING[scene.compositing](BELOW, vec3(0.0), D, coverage(D, D, PIXEL))
+    return [blend, *([union_weight(D, D, D), union_distance(D, D, D)] if unions else [])]
 
 
 # --- readable: a line for every shape ----------------------------------------------------------------------
 
 
-def _lines(scene: Scene, dialect: Dialect) -> dict[str, Any]:
-    layers = [_layer(layer, scene.compositing) for layer in scene.layers]
+def _readable(job: _Job) -> dict[str, Any]:
+    firsts = first_records(job.scene.layers).tolist()
+    layers = [_layer(layer, first, job) for layer, first in zip(job.scene.layers, firsts, strict=True)]
     return {
-        "table": None,
-        "functions": _definitions(layers, dialect),
-        "layers": [statements("c = {};", layer, dialect) for layer in layers],
+        "functions": job.functions(layers),
+        "layers": [statements("c = {};", layer, job.dialect) for layer in layers],
     }
 
 
-def _layer(layer: Layer, compositing: str) -> Expr:
+def _layer(layer: Layer, first: int, job: _Job) -> Expr:
     """The colour after this layer is laid on `c`."""
     distances = [_distance(shape) for shape in layer.shapes]
     colors = [vec3(*(const(channel) for channel in shape.color)) for shape in layer.shapes]
     distance, color = smooth_union(distances, colors, const(layer.smoothness))
+    if job.slack:
+        distance = distance + breath(var(job.target.time), const(first))
     cover = coverage(distance, const(layer.falloff), PIXEL)
-    return COMPOSITING[compositing](BELOW, color, const(layer.opacity), cover)
+    return COMPOSITING[job.scene.compositing](BELOW, color, const(layer.opacity), cover)
 
 
 def _distance(shape: Shape) -> Expr:
     return KINDS[shape.kind].distance(P, *constants(shape))
 
 
-# --- table: a loop over records ----------------------------------------------------------------------------
+# --- records: a loop over a table, with or without lists ----------------------------------------------------
 
 
-def _table(scene: Scene) -> dict[str, Any]:
-    """Records of `stride` vec4 each: (kind, union size, falloff, smoothness), (colour, opacity), parameters.
+def _table(job: _Job) -> dict[str, Any]:
+    form = form_of(job.scene)
+    rows = records(job.scene, form)
+    return _loop(job, form) | {"table": _table_part(job, form) | {"rows": _rows(rows)}}
 
-    What a distance computes from its parameters alone (the cosine of an angle, say) is in the table.
-    """
-    kinds = sorted({layer.kind for layer in scene.layers}, key=list(KINDS).index)
-    entries = {kind: _entry(kind) for kind in kinds}
-    stride = 2 + max(-(-entry.width // 4) for entry in entries.values())
-    rows = [
-        _vec4_rows(_record(layer, shape, kinds, entries), stride)
-        for layer in scene.layers
-        for shape in layer.shapes
-    ]
-    union = any(len(layer.shapes) > 1 for layer in scene.layers)
-    d, k = var("d"), var("smoothness")
-    unions = [union_weight(d, d, k), union_distance(d, d, k)] if union else []
-    blend = COMPOSITING[scene.compositing](BELOW, vec3(0.0), d, coverage(d, d, PIXEL))
-    roots = [*(entry.distance for entry in entries.values()), blend, *unions]
-    return {
-        "layers": [],
-        "functions": _definitions(roots, GLSL),
-        "table": {
-            "count": scene.shape_count,
-            "stride": stride,
-            "rows": rows,
-            "union": union,
-            "blend": COMPOSITING[scene.compositing].name,
-            "kinds": [(kind, expression(entry.distance, GLSL)) for kind, entry in entries.items()],
+
+def _tiled(job: _Job) -> dict[str, Any]:
+    tiles = best_tiles(job.scene, job.target.host.bytes_a_second, job.slack)
+    entries = first_records(job.scene.layers)[tiles.entries]
+    bits = max(1, int(entries.max(initial=0)).bit_length())
+    per = packing.WORD // bits
+    part = _grid_part(job, tiles) | {
+        "starts": _ivec4s(tiles.starts.tolist()),
+        "lists": _ivec4s(packing.joined(entries.tolist(), bits, per)),
+        "bits": bits,
+        "per": per,
+    }
+    return _table(job) | _loop(job, form_of(job.scene), tiles) | {"tiles": part}
+
+
+def _data(job: _Job) -> dict[str, Any]:
+    tiles, form = best_data_tiles(job.scene, job.slack), form_of(job.scene)
+    rows = records(job.scene, form).reshape(-1, 4)
+    numbers = np.concatenate([tiles.starts, first_records(job.scene.layers)[tiles.entries]])
+    array = data_array(rows, numbers)
+    return _loop(job, form, tiles) | {
+        "table": _table_part(job, form),
+        "tiles": _grid_part(job, tiles),
+        "data": {
+            "width": DATA_WIDTH,
+            "height": len(array),
+            "lists": len(rows),
+            "base64": base64.b64encode(array.astype("<f4").tobytes()).decode(),
         },
+        "array": array,
     }
 
 
-class _Entry:
-    """How a kind's distance reads its record: `parts` are the tabulated expressions, in order."""
-
-    def __init__(self, parts: list[Expr], distance: Expr, width: int) -> None:
-        self.parts = parts
-        self.distance = distance
-        self.width = width
-
-
-def _entry(kind: str) -> _Entry:
-    symbolic = KINDS[kind].distance(P, *KINDS[kind].variables())
-    parts = hoist(symbolic, P)
-    slots: Iterator[Expr] = (component(var(f"r{i // 4}", VEC4), i % 4) for i in range(64))
-    replaced = {part: _take(part, slots) for part in parts}
-    return _Entry(parts, substitute(symbolic, replaced), sum(part.type.width for part in parts))
+def data_array(rows: Floats, numbers: NDArray[np.int64]) -> Floats:
+    """Records [R, 4] and whole numbers [M] after them as texels, [rows, DATA_WIDTH, 4]."""
+    flat = np.concatenate([rows.ravel(), numbers.astype(np.float32)])
+    padded = np.zeros(-(-len(flat) // (4 * DATA_WIDTH)) * 4 * DATA_WIDTH, np.float32)
+    padded[: len(flat)] = flat
+    return padded.reshape(-1, DATA_WIDTH, 4)
 
 
-def _take(part: Expr, slots: Iterator[Expr]) -> Expr:
-    if part.type is VEC2:
-        return vec2(next(slots), next(slots))
-    return next(slots)
+def _loop(job: _Job, form: Form, tiles: Tiles | None = None) -> dict[str, Any]:
+    roots = [*(distance for _, distance in form.distances()), *_loop_roots(job.scene, form.unions)]
+    grid = [grid_point(P, P, P)] if tiles else []
+    return {"functions": job.functions([*roots, *grid])}
 
 
-def _record(layer: Layer, shape: Shape, kinds: list[str], entries: dict[str, _Entry]) -> list[float]:
-    head = [kinds.index(shape.kind), len(layer.shapes), layer.falloff, layer.smoothness]
-    values = dict(zip(KINDS[shape.kind].scalars(), map(const, shape.parameters), strict=True))
-    scalars = [scalar for part in entries[shape.kind].parts for scalar in scalarize(part)]
-    return [*head, *shape.color, layer.opacity, *(constant(substitute(scalar, values)) for scalar in scalars)]
+def _table_part(job: _Job, form: Form) -> dict[str, Any]:
+    return {
+        "count": job.scene.shape_count,
+        "stride": form.stride,
+        "union": form.unions,
+        "blend": COMPOSITING[job.scene.compositing].name,
+        "kind": form.slot(form.kind_place),
+        "kinds": [(kind, expression(distance, job.dialect)) for kind, distance in form.distances()],
+    }
 
 
-def _vec4_rows(values: list[float], stride: int) -> str:
-    padded = values + [0.0] * (4 * stride - len(values))
-    quads = (padded[i : i + 4] for i in range(0, len(padded), 4))
-    return ", ".join(f"vec4({', '.join(literal(value) for value in quad)})" for quad in quads)
+def _grid_part(job: _Job, tiles: Tiles) -> dict[str, Any]:
+    grid = tiles.grid
+    low, cells = vec2(*map(const, grid.low)), vec2(const(grid.per_unit))
+    return {
+        "columns": grid.columns,
+        "last_column": grid.columns - 1,
+        "last_row": grid.rows - 1,
+        "after": grid.cells + 1,
+        "place": expression(grid_point(P, low, cells), job.dialect),
+        "coarsest": literal(COARSEST),
+    }
+
+
+def _rows(table: Floats) -> list[list[str]]:
+    """The text of each vec4 of the records, [stride][shapes]."""
+    return [[_vec4(row) for row in rows.tolist()] for rows in table.swapaxes(0, 1)]
+
+
+def _vec4(values: list[float]) -> str:
+    return f"vec4({','.join(short(value) for value in values)})"
+
+
+def short(value: float) -> str:
+    """A number in a GLSL constructor: the shortest text that reads back as the same float32."""
+    text = literal(value)
+    return (
+        text.removesuffix(".0").replace("0.", ".", 1)
+        if text.lstrip("-").startswith("0.")
+        else (text.removesuffix(".0"))
+    )
+
+
+def _ivec4s(numbers: list[int]) -> list[str]:
+    padded = numbers + [0] * (-len(numbers) % 4)
+    return [f"ivec4({','.join(map(str, padded[i : i + 4]))})" for i in range(0, len(padded), 4)]
+
+
+# --- packed: a stream of bits -------------------------------------------------------------------------------
+
+
+@lru_cache(maxsize=8)
+def _packed_scene(scene: Scene, slack: float) -> packing.Packed:
+    return packing.pack(scene, slack)
+
+
+def _packed(job: _Job) -> dict[str, Any]:
+    packed = _packed_scene(job.scene, job.slack)
+    text = packing.PackedText(job.scene, packed, job.dialect)
+    roots = [
+        *text.distances,
+        *_loop_roots(job.scene, text.unions),
+        grid_point(P, P, P),
+        packing.squared(D, D),
+    ]
+    part = text.part() | {"blend": COMPOSITING[job.scene.compositing].name, "coarsest": literal(COARSEST)}
+    return {"functions": job.functions(roots), "packed": part, "error": packed.error}
+
+
+_BODIES = {"readable": _readable, "table": _table, "tiled": _tiled, "packed": _packed, "data": _data}

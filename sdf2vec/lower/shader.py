@@ -77,8 +77,8 @@ def statements(result: str, expr: Expr, dialect: Dialect) -> list[str]:
     return [*lines, result.format(_print(expr, dialect, names)[0])]
 
 
-def definition(function: Function, dialect: Dialect) -> str:
-    """The function's text, its documentation above it."""
+def definition(function: Function, dialect: Dialect, documented: bool = True) -> str:
+    """The function's text, its documentation above it unless `documented` says otherwise."""
     parameters = ", ".join(
         dialect.parameter.format(name=p.payload, type=dialect.types[p.type]) for p in function.parameters
     )
@@ -86,7 +86,8 @@ def definition(function: Function, dialect: Dialect) -> str:
         name=function.name, parameters=parameters, type=dialect.types[function.body.type]
     )
     body = statements("return {};", function.body, dialect)
-    return "\n".join([f"// {function.doc}", f"{head} {{", *(f"  {line}" for line in body), "}"])
+    doc = [f"// {function.doc}"] if documented else []
+    return "\n".join([*doc, f"{head} {{", *(f"  {line}" for line in body), "}"])
 
 
 def used_functions(roots: Iterable[Expr]) -> list[Function]:

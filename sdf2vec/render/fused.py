@@ -102,7 +102,7 @@ def rows_of(groups: list[Group], pixel: float) -> torch.Tensor:
 
 
 def group_rows(group: Group, pixel: float) -> torch.Tensor:
-    """One row of numbers for each layer of a group."""
+    """One row of numbers for each layer of a group, [G, U]: `kernels.LOOK`, then `kernels.Formula.uniforms`."""
     shapes = torch.cat(list(group.parameters.values()), dim=2).flatten(1)  # [G, K·P], shape by shape
     pixels = torch.full_like(group.falloff, pixel)
     head = [group.colors[:, 0], *(x[:, None] for x in (group.opacity, pixels, group.falloff))]

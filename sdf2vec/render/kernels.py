@@ -10,7 +10,7 @@ from types import ModuleType
 from typing import NamedTuple
 
 from ..blend import COMPOSITING, coverage, reach, saturation, smooth_union, union_reach
-from ..expr import VEC2, VEC3, VEC4, Expr, components_of, const, maximum, minimum, scalarize, var
+from ..expr import VEC2, VEC3, VEC4, Expr, Operand, components_of, const, maximum, minimum, scalarize, var
 from ..lower.numba import PREAMBLE, Block, backward, forward, scalar
 from ..shapes import KINDS
 from ..templating import template
@@ -62,9 +62,13 @@ class Formula:
         varying = (*components_of(self.point), *flows_of(channels))
         return Block(name, scalarize(below)[:channels], varying, (*LOOK, *self.uniforms))
 
-    def bounds(self) -> tuple[Expr, ...]:
-        """Box (low x, low y, high x, high y), distance from which coverage is 0, up to which 1, slope."""
-        outer, inner = reach(self.falloff, self.pixel), saturation(self.falloff, self.pixel)
+    def bounds(self, slack: Operand = 0.0) -> tuple[Expr, ...]:
+        """Box (low x, low y, high x, high y), distance from which coverage is 0, up to which 1, slope.
+
+        They hold for every distance that is off by at most `slack`.
+        """
+        outer = reach(self.falloff, self.pixel) + slack
+        inner = saturation(self.falloff, self.pixel) - slack
         margin = outer + union_reach(self.size, self.smoothness)
         boxes = [scalarize(self.kind.extent(margin, *row)) for row in self.parameters]
         slopes = [scalarize(self.kind.slope(*row))[0] for row in self.parameters]

@@ -1,0 +1,109 @@
+"""Shader exports where they are used: a Shadertoy client, WebGL 2 and WebGPU in Chromium, three.js, Godot."""
+
+import numpy as np
+import pytest
+
+from sdf2vec.engines import chromium, glslang_validate, opengl, shadertoy, threejs, webgl
+from sdf2vec.export import packing
+from sdf2vec.export.options import Options
+from sdf2vec.export.shader import shader
+from sdf2vec.render import reference
+from sdf2vec.roundtrip import SHADERTOY_HEAD, SHADERTOY_TAIL
+
+from .scenes import random_scene
+
+SCENE = random_scene(("triangle", "box"), layers=9, seed=12, width=90, height=60)
+SIZES = [(180, 120), (203, 90), (24, 16)]
+
+
+@pytest.fixture(autouse=True)
+def _quick_packing(monkeypatch):
+    monkeypatch.setattr(packing, "SAMPLE", 1 << 17)
+
+
+def rendered(scene, width, height):
+    """Premultiplied RGBA, [H, W, 4]."""
+    return reference.render(scene, width, height).permute(1, 2, 0).numpy()
+
+
+def levels(drawn, expected):
+    return float(255 * np.abs(drawn - expected).max())
+
+
+@pytest.mark.parametrize("layout", ["readable", "packed"])
+def test_a_shadertoy_client_draws_it(layout, require_engine):
+    require_engine("shadertoy")
+    made = shader(SCENE, "shadertoy", Options(layout=layout))
+    drawn = shadertoy.render(made.text, 120, 80)
+    assert levels(drawn, rendered(SCENE, 120, 80)) <= made.error + 0.6  # it gives 8 bits
+
+
+@pytest.mark.parametrize("layout", ["readable", "table", "tiled", "packed"])
+def test_chromium_draws_what_shadertoy_wraps(layout, require_engine):
+    require_engine("chromium")
+    made = shader(SCENE, "shadertoy", Options(layout=layout))
+    for width, height in SIZES:
+        uniforms = {"iResolution": (float(width), float(height), 1.0)}
+        drawn = webgl.render(SHADERTOY_HEAD + made.text + SHADERTOY_TAIL, width, height, uniforms)
+        assert levels(drawn, rendered(SCENE, width, height)) <= made.error + 0.1
+
+
+@pytest.mark.parametrize("layout", ["readable", "data"])
+def test_chromium_draws_glsl(layout, require_engine):
+    require_engine("chromium")
+    made = shader(SCENE, "glsl", Options(layout=layout))
+    for width, height in SIZES:
+        drawn = webgl.render(made.text, width, height, {"resolution": (width, height)}, made.data)
+        assert levels(drawn, rendered(SCENE, width, height)) <= 0.1
+
+
+THREE_PAGE = """<!DOCTYPE html><style>*{{margin:0}}canvas{{display:block}}</style><script type="module">
+import * as THREE from "./three.module.min.js";
+import {{ createMaterial, aspect }} from "./material.js";
+const renderer = new THREE.WebGLRenderer({{ antialias: false }});
+renderer.setSize({width}, {height});
+document.body.append(renderer.domElement);
+const scene = new THREE.Scene();
+scene.add(new THREE.Mesh(new THREE.PlaneGeometry(aspect, 1), createMaterial(THREE)));
+renderer.render(scene, new THREE.OrthographicCamera(-aspect / 2, aspect / 2, 0.5, -0.5, -1, 1));
+document.title = "drawn";
+</script>"""
+
+
+@pytest.mark.parametrize("layout", ["readable", "data"])
+def test_three_js_draws_it(layout, require_engine):
+    require_engine("chromium")
+    require_engine("three")
+    module = shader(SCENE, "three", Options(layout=layout)).text
+    width, height = 240, 160
+    page = THREE_PAGE.format(width=width, height=height)
+    with chromium.opened(
+        {"index.html": page, "material.js": module, **threejs.files()}, width, height
+    ) as shown:
+        shown.wait_for_function("document.title === 'drawn'")
+        shown.wait_for_timeout(300)
+        assert levels(chromium.screenshot(shown, "canvas"), rendered(SCENE, width, height)) <= 1.0
+
+
+# Godot's names in plain GLSL; its own compiler can't be had here.
+GODOT_AS_GLSL = """#version 330
+uniform vec2 resolution;
+out vec4 fragColor;
+#define UV vec2(gl_FragCoord.x / resolution.x, 1.0 - gl_FragCoord.y / resolution.y)
+#define COLOR fragColor
+#define fragment main
+"""
+
+
+@pytest.mark.parametrize("compositing", ["over", "additive"])
+def test_godot_text_is_glsl_but_for_its_names(compositing, require_engine):
+    require_engine("glslang")
+    require_engine("opengl")
+    scene = random_scene(compositing=compositing, layers=12, seed=3, width=90, height=60)
+    text = shader(scene, "godot", Options()).text
+    lines = text.splitlines()
+    assert lines[2:4] == ["shader_type canvas_item;", "render_mode unshaded, blend_premul_alpha;"]
+    plain = GODOT_AS_GLSL + "\n".join([*lines[:2], *lines[4:]])
+    assert glslang_validate(plain) is None
+    drawn = opengl.render(plain, 180, 120, {"resolution": (180.0, 120.0)})
+    assert levels(drawn, rendered(scene, 180, 120)) <= 0.1
