@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from functools import cache
 
@@ -15,7 +16,9 @@ MARGIN = 0.3  # scene units that a position may leave the canvas by
 LONGEST = 1.5  # longest sides of the canvas
 HIGHEST_FREQUENCY = 60.0  # radians per scene unit
 FAINTEST = 0.02  # opacity under `over`: below it a shape would stop learning
-NEWTON_STEPS = 3  # towards the least thickness
+NEWTON_STEPS = 6  # towards the least thickness, at most
+FLAT = 0.1  # squared derivative of a thickness, which is 1 and more unless the shape is next to a point
+GOLDEN = 2.39996  # radians; multiples of it never meet
 
 
 @torch.no_grad()
@@ -68,14 +71,15 @@ def _widen_once(group: Group, least: float) -> bool:
         if not bool(thin.any()):
             return False
         grads = torch.autograd.grad(thickness.sum(), columns, allow_unused=True, materialize_grads=True)
-    slope = torch.stack(grads).square().sum(0).clamp(min=1e-6)
-    step = torch.where(thin, (least - thickness) / slope, 0.0).detach()
-    with torch.no_grad():
-        moves = iter(grads)
-        for parameter in KINDS[group.kind].parameters:
-            values = group.parameters[parameter.name]
-            for axis in range(values.shape[2]):
-                values[..., axis] += next(moves) * step
+    slope = torch.stack(grads).square().sum(0)
+    step = (least - thickness).detach() / slope.clamp(min=FLAT)
+    numbers = iter(enumerate(grads))
+    for parameter in KINDS[group.kind].parameters:
+        for values in group.parameters[parameter.name].detach().unbind(2):
+            index, grad = next(numbers)
+            away = least * math.cos(GOLDEN * index)  # a point may grow in any way
+            move = torch.where(slope < FLAT, away, grad * step)
+            values += torch.where(thin, move, 0.0)
     return True
 
 
