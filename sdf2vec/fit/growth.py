@@ -5,7 +5,6 @@ What is decided is pure; `exchange` alone changes a scene, and Adam's state with
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 from functools import partial
 
@@ -16,24 +15,40 @@ from .placing import Layers, Places, groups_at, straight
 from .pursuit import find_places
 
 PROBES = 8  # random images that estimate what a layer does to the picture
-ROOM = 1.2  # size of a new shape, in radii of the disc whose place it takes
+ROOM = 0.8  # size of a new shape, in radii of the disc whose place it takes: its falloff lies outside of that
 
 
 def importance(image: torch.Tensor, tensors: SceneTensors, generator: torch.Generator) -> list[torch.Tensor]:
     """How much the image changes, squared and summed, when a layer is left out: [G] for each group; an estimate.
 
-    The image [C, H, W], before clamping, depends linearly on a layer's opacity (under `additive`, on its colours),
-    so that its derivative times that is the change; random signs r give E[(Σ r·change)²] = Σ change² (Hutchinson).
+    The image [C, H, W], before clamping, depends linearly on a layer's opacity (under `additive`, on its colours, and
+    its alpha on the opacity), so that its derivative times that is the change; random signs r give
+    E[(Σ r·change)²] = Σ change² (Hutchinson).
     """
-    leaves = [g.colors if tensors.compositing == "additive" else g.opacity for g in tensors.groups]
+    leaves = [(i, leaf) for i, group in enumerate(tensors.groups) for leaf in _linear_in(group, tensors)]
     totals = [torch.zeros(len(group.order)) for group in tensors.groups]
     for _ in range(PROBES):
-        signs = torch.randint(0, 2, image.shape, generator=generator).float() * 2 - 1
-        grads = torch.autograd.grad(image, leaves, signs.to(image.device), retain_graph=True)
-        for total, leaf, grad in zip(totals, leaves, grads, strict=True):
-            change = (leaf.detach() * grad).reshape(len(leaf), math.prod(leaf.shape[1:])).sum(1)
-            total += change.square().cpu()
+        signs = (torch.randint(0, 2, image.shape, generator=generator).float() * 2 - 1).to(image.device)
+        grads = torch.autograd.grad(
+            image,
+            [leaf for _, leaf in leaves],
+            signs,
+            retain_graph=True,
+            allow_unused=True,  # where nothing of a group is on the canvas
+            materialize_grads=True,
+        )
+        changes = [torch.zeros_like(total) for total in totals]
+        for (index, leaf), grad in zip(leaves, grads, strict=True):
+            changes[index] += (leaf.detach() * grad)[:, None].flatten(1).sum(1).cpu()
+        totals = [total + change.square() for total, change in zip(totals, changes, strict=True)]
     return totals
+
+
+def _linear_in(group: Group, tensors: SceneTensors) -> list[torch.Tensor]:
+    """What an image is linear in, such that a group's layers are left out where it is 0."""
+    if tensors.compositing == "over":
+        return [group.opacity]
+    return [group.colors, group.opacity] if tensors.transparent else [group.colors]
 
 
 def least(scores: Sequence[torch.Tensor], count: int) -> list[torch.Tensor]:

@@ -3,14 +3,17 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator
+from itertools import chain, islice, repeat
 from typing import NamedTuple
 
 import torch
 
-ROUNDS = 16  # the residual is looked at anew so many times
+ROUNDS = 16  # the residual is looked at anew so many times, more often where not all discs find room
 SCALE = 1.4  # from one size of disc to the next
 SMALLEST, LARGEST = 0.8, 0.3  # radius of a disc: pixels; shares of the square root of the picture's area
 WIDTH = 0.6  # standard deviation of the Gaussian that stands for a disc of radius 1
+DISC = 0.7  # amount of a disc in that of the Gaussian which fits it best: 1 / (2 − 2·exp(−u)), u = 1.256
 APART = 1.5  # radii around a disc where none is put in the same round
 
 
@@ -26,18 +29,23 @@ def find_places(residual: torch.Tensor, count: int) -> Places:
     """The discs that take most of a residual [C, H, W] away, squared; greedy (Mallat and Zhang 1993)."""
     height, width = residual.shape[1:]
     radii = _radii(height, width)
-    left, found = residual.clone(), []
-    remaining = count
-    for rounds_left in range(ROUNDS, 0, -1):
-        now = math.ceil(remaining / rounds_left)
-        amounts, gains = _responses(left, radii)
-        found += [_take(left, amounts, gains, radii) for _ in range(now)]
-        remaining -= now
-        if remaining == 0:
+    left = residual.clone()
+    found: list[tuple[int, int, int, torch.Tensor]] = []
+    for rounds_left in chain(range(ROUNDS, 0, -1), repeat(1)):
+        if len(found) == count:
             break
-    x, y, scale = (torch.tensor(column) for column in list(zip(*found, strict=True))[:3])
-    centers = torch.stack([x + 0.5, y + 0.5], dim=1)
-    return Places(centers, radii[scale], torch.stack([amount for *_, amount in found]))
+        now = math.ceil((count - len(found)) / rounds_left)
+        found += islice(_round(left, radii), now)
+    x, y, scale = torch.tensor([disc[:3] for disc in found], dtype=torch.int64).reshape(-1, 3).unbind(1)
+    amounts = [residual.new_zeros(0, len(residual)), *(amount[None] for *_, amount in found)]
+    return Places(torch.stack([x + 0.5, y + 0.5], dim=1), radii[scale], DISC * torch.cat(amounts))
+
+
+def _round(left: torch.Tensor, radii: torch.Tensor) -> Iterator[tuple[int, int, int, torch.Tensor]]:
+    """The best discs, taken from the residual one after the other, until their surroundings fill the picture."""
+    amounts, gains = _responses(left, radii)
+    while not gains.max() < 0:
+        yield _take(left, amounts, gains, radii)
 
 
 def _radii(height: int, width: int) -> torch.Tensor:
