@@ -22,6 +22,7 @@ import sdf2vec
 from sdf2vec import Layer, Scene, Shape
 from sdf2vec.cli import main
 from sdf2vec.engines import ENGINES
+from sdf2vec.fit import loop
 from sdf2vec.fit.presets import PRESETS
 from sdf2vec.roundtrip import ROUND_TRIPS
 
@@ -149,6 +150,37 @@ def test_the_summary_says_how_an_engine_draws_it(folder, run, require_engine):
     assert float(figure[2]) <= 0.25
 
 
+def test_the_options_of_a_fit(folder, run, monkeypatch):
+    """All at once; then going on from what came out, with two colours."""
+    monkeypatch.setattr(loop, "TRIAL_STEPS", 2)
+    monkeypatch.setattr(loop, "REFIT_STEPS", 2)
+    common = (
+        "--preset",
+        "fast",
+        "--kind",
+        "circle",
+        "--union",
+        "2",
+        "--emit",
+        "json",
+        "--weights",
+        "mask.png",
+    )
+    Image.new("L", (5, 5), 255).save(folder / "mask.png")
+    options = ("--palette", "#134,#fa0b1c,#fff", "--min-area", "0.01", "--trials", "1")
+    assert run("photo.jpg", *common, "--shapes", "4", *options, "-o", "first.json").code == 0
+    first = sdf2vec.load(folder / "first.json")
+    assert [len(layer.shapes) for layer in first.layers] == [2, 2]
+    colors = {shape.color for layer in first.layers for shape in layer.shapes} | {first.background}
+    levels = {tuple(round(255 * value) for value in color) for color in colors if color}
+    assert levels <= {(17, 51, 68), (250, 11, 28), (255, 255, 255)}
+    again = ("--shapes", "6", "--colors", "2", "--start", "first.json", "-o", "second.json")
+    assert run("photo.jpg", *common, *again).code == 0
+    second = sdf2vec.load(folder / "second.json")
+    assert second.shape_count == 6
+    assert len({shape.color for layer in second.layers for shape in layer.shapes} | {second.background}) <= 2
+
+
 def test_quiet(folder, run):
     outcome = run("photo.jpg", *SHORT, "--quiet")
     assert outcome == (0, b"", "")
@@ -247,6 +279,24 @@ def test_same_seed_same_bytes(folder, run):
         (["photo.jpg", "--compositing", "multiply"], ["unknown compositing 'multiply'", "additive"]),
         (["photo.jpg", "--glsl", "110"], ["unknown GLSL version '110'", "es300"]),
         (["photo.jpg", "--layout", "loose"], ["unknown layout 'loose'"]),
+        (["photo.jpg", "--union", "2"], ["3 shapes can't be joined by 2"]),
+        (["photo.jpg", "--union", "two"], ["--union", "'two'"]),
+        (["photo.jpg", "--weights", "text.png"], ["text.png", "not a picture"]),
+        (["photo.jpg", "--weights", "missing.png"], ["missing.png", "no such file"]),
+        (["photo.jpg", "--weights", "black.png"], ["weights are black"]),
+        (["photo.jpg", "--start", "missing.json"], ["missing.json"]),
+        (["photo.jpg", "--start", "bad.scene.json"], ["bad.scene.json: layers[0].radius"]),
+        (["photo.jpg", "--start", "good.scene.json", "--compositing", "additive"], ["is over, not additive"]),
+        (["sub/photo.png", "--start", "tall.scene.json"], ["start scene has another shape", "1.5 to 1"]),
+        (["photo.jpg", "--palette", "#12"], ["#rgb or #rrggbb, got '#12'"]),
+        (["photo.jpg", "--palette", "#123", "--colors", "3"], ["either a palette or a number"]),
+        (["photo.jpg", "--palette", "#123", "--preset", "thesis"], ["palette needs --compositing over"]),
+        (["photo.jpg", "--colors", "0"], ["colours", "got 0"]),
+        (["photo.jpg", "--colors", "few"], ["--colors", "'few'"]),
+        (["photo.jpg", "--min-area", "1"], ["least area", "got 1"]),
+        (["photo.jpg", "--min-area", "nan"], ["least area", "got nan"]),
+        (["photo.jpg", "--trials", "-1"], ["trials", "got -1"]),
+        (["photo.jpg", "--preset", "thesis", "--compositing", "over"], ["thesis", "--compositing additive"]),
         (["photo.jpg", "--shapes", "0"], ["shapes", "got 0"]),
         (["photo.jpg", "--shapes", "-3"], ["shapes", "got -3"]),
         (["photo.jpg", "--shapes", "65537"], ["shapes", "65536"]),
@@ -308,6 +358,8 @@ def test_refusals_leave_nothing_behind(folder, run, arguments, words):
     circle = Layer((Shape.of("circle", (1, 0, 0), center=(0, 0), radius=0.25),), 0.1)
     good = sdf2vec.dumps(Scene(24, 16, (circle,)))
     (folder / "good.scene.json").write_text(good)
+    (folder / "tall.scene.json").write_text(good.replace("24", "8"))
+    Image.new("L", (5, 5)).save(folder / "black.png")
     (folder / "wide.scene.json").write_text(good.replace("24", "65000").replace("16", "65000"))
     (folder / "bad.scene.json").write_text(good.replace("0.25", "-3"))
     (folder / "folders" / "photo.glsl").mkdir(parents=True)

@@ -60,8 +60,7 @@ def fit_picture(picture: Picture, settings: Settings, callback: Callback = lambd
     """
     with threads_of_its_own():
         fit = Fit(picture, settings, callback)
-        with suppress(Stopped):
-            fit.run()
+        fit.run()
     return to_scene(fit.tensors, picture.width, picture.height)
 
 
@@ -86,7 +85,7 @@ class Fit:
         self.pixels = premultiply(picture.pixels) if picture.has_alpha else picture.pixels
         self.pixel = 1.0 / min(picture.width, picture.height)
         self.size = (picture.width * self.pixel, picture.height * self.pixel)
-        self.done, self.steps = 0, self._count_steps()
+        self.done, self.steps, self.stopped = 0, self._count_steps(), False
         self.tensors = self._start()
         self._announce_compiling()
         self.tensors = on_device(self.tensors, self.device.name)
@@ -99,7 +98,19 @@ class Fit:
         return phases if self.settings.start is None or len(phases) == 1 else phases[1:]
 
     def run(self) -> None:
-        """All phases, in place. Raises Stopped when the callback says so."""
+        """Everything, in place. When the callback stops it, what is promised of the result still holds."""
+        with suppress(Stopped):
+            self._train_all()
+        if self.settings.palette or self.settings.colors:
+            stage = self._stage(self.phases[-1])
+            self._restrict_colors(stage)
+            if not self.stopped:
+                with suppress(Stopped):
+                    self._refit(stage)
+        widen(self.tensors, self.pixel)
+
+    def _train_all(self) -> None:
+        """All phases and trials."""
         for phase in self.phases:
             stage = self._stage(phase)
             for batch in range(phase.batches):
@@ -110,9 +121,6 @@ class Fit:
                     self._train(stage, partial(_in_batch, batch, phase.batches))
         for _ in range(self.settings.trials):
             self._try(stage)
-        if self.settings.palette or self.settings.colors:
-            self._recolor(stage)
-        widen(self.tensors, self.pixel)
 
     def _count_steps(self) -> int:
         steps = sum(phase.total for phase in self.phases) + self.settings.trials * TRIAL_STEPS
@@ -125,7 +133,7 @@ class Fit:
             count = settings.shapes // settings.union
             return place(target, self.size, layers, count, self.preset.start, self.generator)
         _check_start(settings.start, self.size)
-        tensors = from_scene(settings.start)
+        tensors = replace(from_scene(settings.start), size=self.size)
         if tensors.transparent != (len(target) == 4):
             tensors.background = background_of(target)
         present = {(group.kind, group.union_size) for group in tensors.groups}
@@ -134,17 +142,18 @@ class Fit:
         return tensors
 
     def _resize(self, tensors: SceneTensors, target: torch.Tensor) -> None:
-        """Brings a start scene to the number of shapes asked for."""
-        sizes = torch.cat([torch.full((len(group.order),), group.union_size) for group in tensors.groups])
-        spare = int(sizes.sum()) - self.settings.shapes
+        """Brings a start scene to the number of shapes asked for, or just below it where unions leave a rest."""
         optimizer = adam(tensors)
-        image = fused.composite(tensors, target.shape[2], target.shape[1], len(target))
+        spare = _shape_count(tensors) - self.settings.shapes
         if spare > 0:
+            image = fused.composite(tensors, target.shape[2], target.shape[1], len(target))
             scores = importance(image, tensors, self.generator)
+            sizes = torch.cat([torch.full((len(group.order),), group.union_size) for group in tensors.groups])
             taken = sizes[torch.cat(scores).argsort(stable=True)].cumsum(0)
             exchange(tensors, optimizer, least(scores, int((taken < spare).sum()) + 1), ())
-        elif spare < 0:
-            count = -spare // self.settings.union
+        count = (self.settings.shapes - _shape_count(tensors)) // self.settings.union
+        if count > 0:
+            image = fused.composite(tensors, target.shape[2], target.shape[1], len(target))
             everything = [torch.arange(len(group.order)) for group in tensors.groups]
             fresh = newcomers(image, target, count, tensors, _layers_of(self.settings), self.generator)
             exchange(tensors, optimizer, everything, fresh)
@@ -178,6 +187,7 @@ class Fit:
             loss = self._step(stage, rate, moves)
             self.done += 1
             if self.callback(Progress(phase.name, self.done, self.steps, loss, self.device.name)):
+                self.stopped = True
                 raise Stopped
 
     def _step(self, stage: Stage, rate: float, moves: Callable[[Group], torch.Tensor] | None) -> float:
@@ -199,11 +209,13 @@ class Fit:
 
     def _try(self, stage: Stage) -> None:
         """Starts a few layers anew, anywhere, trains them alone, and takes that back unless the loss falls."""
+        count = min(TRIAL_LAYERS, self._replaceable)
+        if count == 0:
+            return
         before = [group.each(lambda tensor: tensor.detach().clone()) for group in self.tensors.groups]
         image = self._draw(self.tensors, stage.target)
         loss = float(stage.measure(image).detach())
-        count = min(TRIAL_LAYERS, self.tensors.layer_count)
-        scores = importance(image, self.tensors, self.generator)
+        scores = self._scores(image)
         places = place(
             stage.target.cpu(), self.size, _layers_of(self.settings), count, ANYWHERE, self.generator
         )
@@ -213,35 +225,57 @@ class Fit:
         first = self.tensors.layer_count - count
         phase = Phase("trial", TRIAL_STEPS, stage.phase.resolution, rate=TRIAL_RATE, end_rate=0.05)
         self.optimizer = adam(self.tensors)
-        self._train(replace(stage, phase=phase), lambda group: group.order >= first)
-        with torch.no_grad():
-            worse = float(stage.measure(self._draw(self.tensors, stage.target))) >= loss
-        if worse:
-            self.tensors.groups = before
-        self.optimizer = adam(self.tensors)
+        try:
+            self._train(replace(stage, phase=phase), lambda group: group.order >= first)
+        finally:  # also when stopped
+            with torch.no_grad():
+                worse = float(stage.measure(self._draw(self.tensors, stage.target))) >= loss
+            if worse:
+                self.tensors.groups = before
+            self.optimizer = adam(self.tensors)
 
-    def _recolor(self, stage: Stage) -> None:
-        """Restricts the colours, and fits the rest again."""
+    def _restrict_colors(self, stage: Stage) -> None:
+        """To the palette given or, of so many colours, the best."""
         cover = importance(self._draw(self.tensors, stage.target), self.tensors, self.generator)
         palette = self.settings.palette or found(self.tensors, cover, self.settings.colors, self.generator)
         snap(self.tensors, list(palette))
+
+    def _refit(self, stage: Stage) -> None:
+        """Trains all but the colours."""
         self.optimizer = adam(self.tensors, frozen=("color", "background"))
         phase = Phase("palette", REFIT_STEPS, stage.phase.resolution, rate=0.4, end_rate=0.02)
         self._train(replace(stage, phase=phase))
 
     def _relocate(self, stage: Stage, share: float) -> None:
-        count = round(share * self.tensors.layer_count)
+        count = min(round(share * self.tensors.layer_count), self._replaceable)
         if count == 0:
             return
         image = self._draw(self.tensors, stage.target)
-        scores = importance(image, self.tensors, self.generator)
+        scores = self._scores(image)
         layers = _layers_of(self.settings)
         fresh = newcomers(image, stage.target, count, self.tensors, layers, self.generator, stage.weights)
         exchange(self.tensors, self.optimizer, least(scores, count), fresh)
 
+    @property
+    def _replaceable(self) -> int:
+        """How many layers are of as many shapes as new ones, so that the number of shapes stays."""
+        return sum(len(g.order) for g in self.tensors.groups if g.union_size == self.settings.union)
+
+    def _scores(self, image: torch.Tensor) -> list[torch.Tensor]:
+        """The importance of each group's layers; infinite where they can't be replaced."""
+        scores = importance(image, self.tensors, self.generator)
+        return [
+            score if group.union_size == self.settings.union else torch.full_like(score, math.inf)
+            for score, group in zip(scores, self.tensors.groups, strict=True)
+        ]
+
 
 def _layers_of(settings: Settings) -> Layers:
     return Layers(settings.kinds, settings.compositing, settings.union)
+
+
+def _shape_count(tensors: SceneTensors) -> int:
+    return sum(len(group.order) * group.union_size for group in tensors.groups)
 
 
 def _check_start(scene: Scene, size: tuple[float, float]) -> None:

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import math
+import os
 import re
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any
 
@@ -79,7 +80,7 @@ def settings_of(
     min_area: float | None = None,
     start: Any = None,
     trials: int = 0,
-    palette: str | Sequence[Color] | None = None,
+    palette: str | Sequence[Color | str] | None = None,
     colors: int | None = None,
     weights: Any = None,
 ) -> Settings:
@@ -93,11 +94,7 @@ def settings_of(
     _check_whole("number of trials", trials, 0, 10_000)
     if shapes % union:
         raise Sdf2vecError(f"{shapes} shapes can't be joined by {union}: choose a multiple of {union}")
-    if min_area is not None and not 0 <= min_area <= LARGEST_AREA:
-        raise Sdf2vecError(
-            f"the least area must be a share of the canvas up to {LARGEST_AREA}, got {min_area}"
-        )
-    scene = start if start is None or isinstance(start, Scene) else load_scene(start)
+    scene = _scene_of(start)
     settings = Settings(
         int(shapes),
         kinds,
@@ -107,7 +104,7 @@ def settings_of(
         int(seed),
         device,
         int(union),
-        min_area,
+        _area_of(min_area),
         scene,
         int(trials),
         *_colors(palette, colors),
@@ -117,6 +114,32 @@ def settings_of(
     if settings.compositing != "over" and (settings.palette or settings.colors):
         raise Sdf2vecError("a palette needs --compositing over: additive colours mix")
     return settings
+
+
+def _scene_of(start: Any) -> Scene | None:
+    if start is None or isinstance(start, Scene):
+        return start
+    if not isinstance(start, str | os.PathLike):
+        raise Sdf2vecError(f"the start is a scene or the path of its file, got {type(start).__name__}")
+    return load_scene(start)
+
+
+def _area_of(share: Any) -> float | None:
+    try:
+        if share is None or 0 <= share <= LARGEST_AREA:
+            return share if share is None else float(share)
+    except (TypeError, ValueError):
+        pass
+    raise Sdf2vecError(f"the least area must be a share of the canvas up to {LARGEST_AREA}, got {share!r}")
+
+
+def _listed(what: str, value: Any) -> list[Any]:
+    """One text, or several things. Raises Sdf2vecError for anything else."""
+    if isinstance(value, str):
+        return [value]
+    if not isinstance(value, Iterable):
+        raise Sdf2vecError(f"unknown {what} {value!r}")
+    return list(value)
 
 
 def _compositing(asked: str | None, preset: str, start: Scene | None) -> str:
@@ -130,7 +153,7 @@ def _compositing(asked: str | None, preset: str, start: Scene | None) -> str:
     )
 
 
-def _colors(palette: str | Sequence[Color] | None, count: int | None) -> tuple[tuple[Color, ...], int]:
+def _colors(palette: str | Sequence[Color | str] | None, count: int | None) -> tuple[tuple[Color, ...], int]:
     if palette is not None and count is not None:
         raise Sdf2vecError("either a palette or a number of colours, not both")
     if count is not None:
@@ -139,9 +162,13 @@ def _colors(palette: str | Sequence[Color] | None, count: int | None) -> tuple[t
     return (palette_of(palette) if palette is not None else ()), 0
 
 
-def palette_of(palette: str | Sequence[Color]) -> tuple[Color, ...]:
+def palette_of(palette: str | Sequence[Color | str]) -> tuple[Color, ...]:
     """Colours 0..1 from "#123,#a0b1c2" or from tuples. Raises Sdf2vecError for what is no colour."""
-    parts = [part.strip() for part in palette.split(",")] if isinstance(palette, str) else list(palette)
+    parts = (
+        [part.strip() for part in palette.split(",")]
+        if isinstance(palette, str)
+        else _listed("palette", palette)
+    )
     if not parts:
         raise Sdf2vecError("a palette needs at least one colour")
     return tuple(map(_color, parts))
@@ -183,7 +210,7 @@ def weights_for(weights: NDArray[np.float32], width: int, height: int) -> NDArra
 
 def kinds_of(kind: str | Sequence[str]) -> tuple[str, ...]:
     """Names of kinds from one name, several, or "mixed". Raises Sdf2vecError for an unknown one."""
-    names = [kind] if isinstance(kind, str) else list(kind)
+    names = _listed("kind", kind)
     for name in names:
         check_choice("kind", name, (*KINDS, MIXED))
     if not names:
@@ -198,7 +225,7 @@ def losses_of(loss: str | Sequence[tuple[str, float]] | None) -> Loss | None:
     """
     if loss is None:
         return None
-    terms = tuple(map(_term, loss.split(",") if isinstance(loss, str) else loss))
+    terms = tuple(map(_term, loss.split(",") if isinstance(loss, str) else _listed("loss", loss)))
     names = [name for name, _ in terms]
     if not names:
         raise Sdf2vecError(f"at least one loss is needed: {', '.join(LOSS_NAMES)}")
