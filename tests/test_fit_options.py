@@ -248,6 +248,19 @@ def test_weights_draw_the_fit_to_the_bright_part():
     assert error(weighted, pic) > error(plain, pic)
 
 
+def test_steps_follow_the_weights(monkeypatch):
+    """Without relocation, too: the losses themselves see them."""
+    phases = tuple(replace(phase, relocation=None) for phase in PRESETS["fast"].phases)
+    monkeypatch.setitem(PRESETS, "fast", replace(PRESETS["fast"], phases=phases))
+    pic, mask = busy(), np.zeros((8, 12), dtype=np.float32)
+    mask[:, :6] = 1.0
+    left = slice(None), slice(None), slice(0, 24)
+    errors = [
+        float(mse(render(fitted(pic, 10, weights=w))[:3][left], as_tensor(pic)[left])) for w in (None, mask)
+    ]
+    assert errors[1] < 0.9 * errors[0]
+
+
 def test_weights_all_white_change_nothing():
     assert fitted(weights=np.ones((5, 5), dtype=np.float32)) == fitted()
 
