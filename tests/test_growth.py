@@ -7,6 +7,7 @@ import torch
 
 from sdf2vec import Layer, Scene, Shape
 from sdf2vec.fit import growth
+from sdf2vec.fit.adam import Adam
 from sdf2vec.fit.growth import exchange, importance, least, newcomers
 from sdf2vec.fit.loop import adam
 from sdf2vec.fit.placing import Layers, Places, empty_groups, groups_at
@@ -105,10 +106,8 @@ def two_kinds():
 def step(tensors, optimizer, times=1):
     """Steps down the squared image, with the dense renderer."""
     for _ in range(times):
-        optimizer.zero_grad(set_to_none=True)
+        optimizer.zero_grad()
         composite(tensors, 9, 6).square().sum().backward()
-        for group in optimizer.param_groups:
-            group["lr"] = group["base_rate"]
         optimizer.step()
 
 
@@ -133,8 +132,9 @@ def test_rows_that_stay_keep_their_history_and_new_ones_have_none():
     tensors, optimizer = two_kinds()
     step(tensors, optimizer, 3)
     radius = tensors.groups[0].parameters["radius"]
-    before, values = {k: v.clone() for k, v in optimizer.state[radius].items()}, radius.detach().clone()
-    states = len(optimizer.state)
+    index = next(i for i, moving in enumerate(optimizer.moving) if moving.tensor is radius)
+    moving = optimizer.moving[index]
+    before, values = (moving.mean.clone(), moving.square.clone()), radius.detach().clone()
     fresh = circles(2)
     for group in fresh:
         group.order += tensors.layer_count
@@ -143,13 +143,13 @@ def test_rows_that_stay_keep_their_history_and_new_ones_have_none():
     now = tensors.groups[0].parameters["radius"]
     assert torch.equal(now[:2], values[[0, 3]])
     assert torch.equal(now[2:], fresh[0].parameters["radius"])
-    for name in ("exp_avg", "exp_avg_sq"):
-        assert torch.equal(optimizer.state[now][name][:2], before[name][[0, 3]])
-        assert float(before[name].abs().min()) > 0
-        assert not optimizer.state[now][name][2:].any()
-    assert float(optimizer.state[now]["step"]) == 3
-    assert len(optimizer.state) == states
-    trained = {id(p) for group in optimizer.param_groups for p in group["params"]}
+    assert moving.tensor is now
+    for after, old in zip((moving.mean, moving.square), before, strict=True):
+        assert torch.equal(after[:2], old[[0, 3]])
+        assert float(old.abs().min()) > 0
+        assert not after[2:].any()
+    assert float(moving.steps) == 3
+    trained = {id(moving.tensor) for moving in optimizer.moving}
     assert trained == {id(t) for g in tensors.groups for _, t in g.tensors()} | {id(tensors.background)}
     step(tensors, optimizer)
     assert not torch.equal(now[:2], values[[0, 3]])
@@ -176,6 +176,19 @@ def test_a_group_may_lose_all_rows_and_a_new_kind_may_come():
     places = Places(torch.zeros(1, 2), torch.full((1,), 0.2), torch.full((1, 4), 0.5))
     exchange(tensors, optimizer, [torch.arange(0), torch.arange(2)], groups_at(places, unions, seeded(), 2))
     assert [(g.kind, g.union_size, len(g.order)) for g in tensors.groups][2:] == [("box", 2, 1)]
+
+
+def test_adam_is_torchs_own():
+    start, pull = torch.tensor([1.0, -2.0]), torch.tensor([0.3, 4.0])
+    ours, theirs = start.clone(), start.clone().requires_grad_()
+    optimizer, other = Adam([(ours, 0.05)]), torch.optim.Adam([theirs], lr=0.05, betas=(0.9, 0.99), eps=1e-12)
+    for _ in range(5):
+        for tensor, one in ((ours, optimizer), (theirs, other)):
+            one.zero_grad()
+            (tensor * pull).square().sum().backward()
+            one.step()
+    assert torch.allclose(ours, theirs, atol=1e-6)
+    assert not torch.allclose(ours, start, atol=0.1)
 
 
 # --- newcomers and pursuit ---------------------------------------------------------------------------------

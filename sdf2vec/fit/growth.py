@@ -11,6 +11,7 @@ from functools import partial
 import torch
 
 from ..render.tensors import Group, SceneTensors
+from .adam import Adam
 from .placing import Layers, Places, groups_at, straight
 from .pursuit import find_places
 
@@ -30,9 +31,8 @@ def importance(image: torch.Tensor, tensors: SceneTensors, generator: torch.Gene
     for _ in range(PROBES):
         signs = (torch.randint(0, 2, image.shape, generator=generator).float() * 2 - 1).to(image.device)
         grads = torch.autograd.grad(
-            image,
+            (image * signs).sum(),  # torch imports a whole algebra system when it is given the signs
             [leaf for _, leaf in leaves],
-            signs,
             retain_graph=True,
             allow_unused=True,  # where nothing of a group is on the canvas
             materialize_grads=True,
@@ -90,7 +90,7 @@ def newcomers(
 
 def exchange(
     tensors: SceneTensors,
-    optimizer: torch.optim.Optimizer,
+    optimizer: Adam,
     stays: Sequence[torch.Tensor],
     fresh: Sequence[Group],
 ) -> None:
@@ -105,7 +105,7 @@ def exchange(
         joined = kept if new is None else kept.joined(new.each(partial(_beside, old.order)))
         tensors.groups[index] = joined
         for (_, before), (_, after) in zip(old.tensors(), joined.tensors(), strict=True):
-            _replace(optimizer, before, after, rows)
+            optimizer.replace(before, after, rows)
     tensors.groups += [new for new in fresh if not any(_same(new, old) for old in tensors.groups)]
     _renumber(tensors.groups)
 
@@ -120,25 +120,6 @@ def _beside(other: torch.Tensor, tensor: torch.Tensor) -> torch.Tensor:
 
 def _same(a: Group, b: Group) -> bool:
     return (a.kind, a.union_size) == (b.kind, b.union_size)
-
-
-def _replace(
-    optimizer: torch.optim.Optimizer, before: torch.Tensor, after: torch.Tensor, rows: torch.Tensor
-) -> None:
-    """Puts a tensor in another's place; rows beyond the kept ones have no history."""
-    for group in optimizer.param_groups:
-        if group["params"][0] is before:
-            group["params"] = [after.requires_grad_()]
-            if state := optimizer.state.pop(before, None):
-                optimizer.state[after] = {name: _kept(value, after, rows) for name, value in state.items()}
-
-
-def _kept(value: torch.Tensor, after: torch.Tensor, rows: torch.Tensor) -> torch.Tensor:
-    if value.dim() == 0:
-        return value  # how many steps there have been
-    history = torch.zeros_like(after)
-    history[: len(rows)] = value[rows.to(value.device)]
-    return history.detach()
 
 
 def _renumber(groups: Sequence[Group]) -> None:

@@ -18,10 +18,10 @@ from ..render.device import Device, choose
 from ..render.fused import is_compiled, threads_of_its_own
 from ..render.tensors import Group, SceneTensors, from_scene, on_device, to_scene
 from ..scene import Scene
+from .adam import Adam
 from .constraints import project, too_small, widen
 from .growth import exchange, importance, least, newcomers
 from .losses import Objective, objective
-from .palette import found, snap
 from .placing import Layers, background_of, empty_groups, place
 from .presets import CROWDED, CROWDING, LENGTHS, MANY, RATES, Phase, Start
 from .settings import Settings, preset_of, weights_for
@@ -191,7 +191,7 @@ class Fit:
                 raise Stopped
 
     def _step(self, stage: Stage, rate: float, moves: Callable[[Group], torch.Tensor] | None) -> float:
-        self.optimizer.zero_grad(set_to_none=True)
+        self.optimizer.zero_grad()
         value = stage.measure(self._draw(self.tensors, stage.target))
         if self.preset.least_area > 0:
             least_area = self.preset.least_area * self.size[0] * self.size[1]
@@ -199,9 +199,7 @@ class Fit:
         value.backward()
         if moves is not None:
             _freeze(self.tensors, moves)
-        for group in self.optimizer.param_groups:
-            group["lr"] = group["base_rate"] * rate
-        self.optimizer.step()
+        self.optimizer.step(rate)
         project(self.tensors, self.pixel, self.preset.falloff)
         if self.done % WIDEN_EVERY == 0:
             widen(self.tensors, self.pixel)
@@ -236,6 +234,8 @@ class Fit:
 
     def _restrict_colors(self, stage: Stage) -> None:
         """To the palette given or, of so many colours, the best."""
+        from .palette import found, snap  # loads scipy, which most fits don't need
+
         cover = importance(self._draw(self.tensors, stage.target), self.tensors, self.generator)
         palette = self.settings.palette or found(self.tensors, cover, self.settings.colors, self.generator)
         snap(self.tensors, list(palette))
@@ -302,7 +302,7 @@ def _freeze(tensors: SceneTensors, moves: Callable[[Group], torch.Tensor]) -> No
         tensors.background.grad.zero_()
 
 
-def adam(tensors: SceneTensors, frozen: tuple[str, ...] = ()) -> torch.optim.Adam:
+def adam(tensors: SceneTensors, frozen: tuple[str, ...] = ()) -> Adam:
     """Adam over all that may move, each tensor at the rate of what it means; `frozen`: names in `RATES`."""
     free = [pair for group in tensors.groups for pair in group.tensors()]
     if not tensors.transparent:
@@ -310,16 +310,7 @@ def adam(tensors: SceneTensors, frozen: tuple[str, ...] = ()) -> torch.optim.Ada
         if tensors.compositing == "additive":
             frozen = (*frozen, "opacity")
     rates = _rates_for(tensors)
-    return torch.optim.Adam(
-        [
-            {"params": [tensor.detach_().requires_grad_()], "lr": 0.0, "base_rate": rates[name]}
-            for name, tensor in free
-            if name not in frozen
-        ],
-        betas=(0.9, 0.99),
-        eps=1e-12,
-        fused=True,
-    )
+    return Adam((tensor, rates[name]) for name, tensor in free if name not in frozen)
 
 
 def _rates_for(tensors: SceneTensors) -> dict[str, float]:

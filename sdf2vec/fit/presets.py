@@ -106,7 +106,7 @@ PRESETS: dict[str, Preset] = {
         (
             Phase("coarse", 300, 96, relocation=OFTEN),
             Phase("middle", 250, 128, rate=0.8, end_rate=0.4, relocation=OFTEN),
-            Phase("fine", 150, 320, rate=0.4, end_rate=0.02, loss=L1_FLIP),
+            Phase("fine", 120, 320, rate=0.4, end_rate=0.02, loss=L1_FLIP),
         )
     ),
     "best": Preset(

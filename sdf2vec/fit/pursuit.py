@@ -9,7 +9,7 @@ from typing import NamedTuple
 
 import torch
 
-ROUNDS = 16  # the residual is looked at anew so many times, more often where not all discs find room
+ROUNDS = 4  # the residual is looked at anew so many times, more often where not all discs find room
 SCALE = 1.4  # from one size of disc to the next
 SMALLEST, LARGEST = 0.8, 0.3  # radius of a disc: pixels; shares of the square root of the picture's area
 WIDTH = 0.6  # standard deviation of the Gaussian that stands for a disc of radius 1
@@ -58,29 +58,26 @@ def _radii(height: int, width: int) -> torch.Tensor:
 
 def _responses(left: torch.Tensor, radii: torch.Tensor) -> tuple[torch.Tensor, torch.Tensor]:
     """For a disc of every size at every pixel, the best amount [S, C, H, W] and what it gains [S, H, W]."""
-    amounts, gains = [], []
-    for radius in radii.tolist():
-        kernel = _kernel(radius)
-        energy = kernel.square().sum() ** 2  # of the two-dimensional kernel, which is a product
-        fitted = _blur(left, kernel)
-        amounts.append(fitted / energy)
-        gains.append(fitted.square().sum(0) / energy)
-    return torch.stack(amounts), torch.stack(gains)
+    energy = torch.stack([_energy(radius) for radius in radii.tolist()])
+    down, across = (_windows(side, radii) for side in left.shape[1:])
+    fitted = down[:, None] @ left @ across[:, None]  # a Gaussian is a product, so two small matrices blur
+    return fitted / energy[:, None, None, None], fitted.square().sum(1) / energy[:, None, None]
 
 
-def _kernel(radius: float) -> torch.Tensor:
-    half = max(1, math.ceil(2.5 * WIDTH * radius))
-    return _window(torch.arange(-half, half + 1), radius)
+def _windows(side: int, radii: torch.Tensor) -> torch.Tensor:
+    """For each size the Gaussian of every place at every other [S, side, side]."""
+    places = torch.arange(side)
+    return torch.stack([_window(places[:, None] - places, radius) for radius in radii.tolist()])
+
+
+def _energy(radius: float) -> torch.Tensor:
+    """The sum of squares of a whole disc."""
+    half = math.ceil(4 * WIDTH * radius)
+    return _window(torch.arange(-half, half + 1), radius).square().sum() ** 2
 
 
 def _window(offsets: torch.Tensor, radius: float) -> torch.Tensor:
     return torch.exp(-0.5 * (offsets / (WIDTH * radius)).square())
-
-
-def _blur(image: torch.Tensor, kernel: torch.Tensor) -> torch.Tensor:
-    half = len(kernel) // 2
-    across = torch.nn.functional.conv2d(image[:, None], kernel[None, None, None, :], padding=(0, half))
-    return torch.nn.functional.conv2d(across, kernel[None, None, :, None], padding=(half, 0))[:, 0]
 
 
 def _take(

@@ -1,0 +1,84 @@
+"""Torch's Adam over tensors whose rows come and go, each at a rate of its own.
+
+The functional form is used: the class imports torch's compiler at its first step, which takes a second.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+
+import torch
+from torch.optim.adam import adam as adam_step
+
+BETAS = (0.9, 0.99)
+EPSILON = 1e-12
+
+
+@dataclass
+class Moving:
+    """A tensor that is trained, and what Adam remembers of it: running means of the derivative and its square."""
+
+    tensor: torch.Tensor
+    rate: float
+    mean: torch.Tensor
+    square: torch.Tensor
+    steps: torch.Tensor
+
+    @classmethod
+    def of(cls, tensor: torch.Tensor, rate: float) -> Moving:
+        """Without history."""
+        zero = torch.zeros_like(tensor).detach()
+        return cls(tensor.detach_().requires_grad_(), rate, zero, zero.clone(), zero.new_zeros(()))
+
+    def step(self, factor: float) -> None:
+        """One step down the tensor's derivative, if there is any."""
+        if self.tensor.grad is None:
+            return
+        adam_step(
+            [self.tensor],
+            [self.tensor.grad],
+            [self.mean],
+            [self.square],
+            [],
+            [self.steps],
+            fused=True,
+            amsgrad=False,
+            maximize=False,
+            weight_decay=0.0,
+            beta1=BETAS[0],
+            beta2=BETAS[1],
+            lr=self.rate * factor,
+            eps=EPSILON,
+        )
+
+
+class Adam:
+    """Adam (Kingma and Ba 2015) with β₁ = 0.9, β₂ = 0.99."""
+
+    def __init__(self, rates: Iterable[tuple[torch.Tensor, float]]) -> None:
+        self.moving = [Moving.of(tensor, rate) for tensor, rate in rates]
+
+    def zero_grad(self) -> None:
+        """Forgets all derivatives."""
+        for moving in self.moving:
+            moving.tensor.grad = None
+
+    @torch.no_grad()
+    def step(self, factor: float = 1.0) -> None:
+        """One step, all rates scaled by a factor."""
+        for moving in self.moving:
+            moving.step(factor)
+
+    def replace(self, before: torch.Tensor, after: torch.Tensor, rows: torch.Tensor) -> None:
+        """Puts a tensor in another's place: its first rows are these of the other, the rest has no history."""
+        for moving in self.moving:
+            if moving.tensor is before:
+                moving.tensor = after.requires_grad_()
+                moving.mean, moving.square = (_kept(x, after, rows) for x in (moving.mean, moving.square))
+
+
+def _kept(memory: torch.Tensor, after: torch.Tensor, rows: torch.Tensor) -> torch.Tensor:
+    kept = torch.zeros_like(after).detach()
+    kept[: len(rows)] = memory[rows.to(memory.device)]
+    return kept
