@@ -93,7 +93,7 @@ class Shader:
         line = str(self.choice)
         if self.error:
             line += f", off by at most {self.error:.2f} levels"
-        if len(self.text) > TEXT_LIMIT:
+        if len(self.text) > TEXT_LIMIT and self.choice.layout != "data":
             line += f"; warning: more than {TEXT_LIMIT // 1024} KiB of text, which some hosts refuse"
         return line
 
