@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+import sdf2vec
 from sdf2vec.engines import chromium, glslang_validate, opengl, shadertoy, threejs, webgl
 from sdf2vec.export import packing
 from sdf2vec.export.options import Options
@@ -107,3 +108,56 @@ def test_godot_text_is_glsl_but_for_its_names(compositing, require_engine):
     assert glslang_validate(plain) is None
     drawn = opengl.render(plain, 180, 120, {"resolution": (180.0, 120.0)})
     assert levels(drawn, rendered(scene, 180, 120)) <= 0.1
+
+
+TINT = """async (code) => {
+  const adapter = await navigator.gpu.requestAdapter();
+  const device = await adapter.requestDevice();
+  const module = device.createShaderModule({ code });
+  return (await module.getCompilationInfo()).messages.map((message) => message.message);
+}"""
+
+
+@pytest.mark.parametrize("compositing", ["over", "additive"])
+def test_tint_accepts_wgsl(compositing, require_engine):
+    """Chromium's WGSL compiler; naga, wgpu's, compiles the same texts wherever they are drawn."""
+    require_engine("chromium")
+    scene = random_scene(compositing=compositing, layers=12, seed=3)
+    with chromium.opened({"index.html": "<p></p>"}, 64, 64) as page:
+        assert page.evaluate(TINT, "fn f() -> i32 { return 1.5; }")
+        for layout in ("readable", "data"):
+            assert page.evaluate(TINT, shader(scene, "wgsl", Options(layout=layout)).text) == []
+
+
+@pytest.fixture(scope="module")
+def photo():
+    """A real photo in 256 shapes."""
+    data = pytest.importorskip("skimage.data")
+    return sdf2vec.fit(data.coffee()[::4, ::4], 256, preset="fast", seed=1)
+
+
+def test_a_fitted_photo_in_a_browser(photo, require_engine):
+    """256 shapes, at three sizes, from 8 bits: at least 55 dB, and neither darker nor brighter."""
+    require_engine("chromium")
+    scene = photo
+    for target, layout in (("glsl", "data"), ("shadertoy", "tiled")):
+        made = shader(scene, target, Options(layout=layout))
+        text = SHADERTOY_HEAD + made.text + SHADERTOY_TAIL if target == "shadertoy" else made.text
+        for width, height in ((150, 100), (107, 60), (64, 64)):
+            uniforms = {"resolution": (width, height), "iResolution": (width, height, 1.0)}
+            drawn = np.round(255 * webgl.render(text, width, height, uniforms, made.data))
+            difference = drawn - 255 * rendered(scene, width, height)
+            assert 10 * np.log10(255**2 / np.mean(difference**2)) >= 55
+            assert abs(difference.mean()) <= 0.1
+
+
+def test_the_default_shadertoy_of_256_shapes(photo, require_engine):
+    """Small, and within a level of the render on a full HD canvas (a part of which is looked at here)."""
+    require_engine("opengl")
+    scene = photo
+    made = shader(scene, "shadertoy", Options(title="coffee"))
+    assert made.choice.layout == "packed"
+    assert len(made.text.encode()) <= 15_000
+    uniforms = {"iResolution": (960.0, 540.0, 1.0)}
+    drawn = opengl.render(SHADERTOY_HEAD + made.text + SHADERTOY_TAIL, 960, 540, uniforms)
+    assert levels(drawn, rendered(scene, 960, 540)) <= 1.0

@@ -12,12 +12,13 @@ import time
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
+from queue import Empty
 from typing import Any
 
 import numpy as np
 
 from .. import api
-from ..engines import opengl, webgl, webgpu
+from ..engines import EngineError, opengl, webgl, webgpu
 from ..export.layouts import TEXT_LIMIT, fits_constants
 from ..export.options import Options
 from ..export.shader import Shader, shader
@@ -27,7 +28,7 @@ from ..scene import Scene
 
 COUNTS = (16, 64, 256, 1024, 4096)
 SIDE = 512  # pixels of the square canvas
-SECONDS = 90  # after which a combination is given up
+SECONDS = 60  # after which a combination is given up
 FRAMES = 2
 MOST_READABLE = 1024  # statements; more take minutes to compile
 LAYOUTS = {
@@ -92,7 +93,10 @@ DRAW = {"Chromium": _chromium, "llvmpipe": _native(opengl.render), "lavapipe": _
 
 def _worker(queue: Any, *arguments: Any) -> None:
     _warm(arguments[-1])
-    queue.put(measure(*arguments))
+    try:
+        queue.put(measure(*arguments))
+    except EngineError:
+        queue.put("refused")
 
 
 def _warm(engine: str) -> None:
@@ -102,18 +106,19 @@ def _warm(engine: str) -> None:
     DRAW[engine](shader(scene, target, Options()), target)
 
 
-def in_time(*arguments: Any) -> Measured | None:
-    """`measure` in a process of its own, None where it does not end."""
+def in_time(*arguments: Any) -> Measured | str:
+    """`measure` in a process of its own, or in a word why there is none."""
     context = multiprocessing.get_context("spawn")
     queue = context.Queue()
     process = context.Process(target=_worker, args=(queue, *arguments))
     process.start()
-    process.join(SECONDS)
-    if process.is_alive():
-        process.kill()
-        process.join()
-        return None
-    return queue.get() if process.exitcode == 0 else None
+    try:
+        found: Measured | str = queue.get(timeout=SECONDS)
+    except Empty:
+        found = f"over {SECONDS}"
+    process.kill()
+    process.join()
+    return found
 
 
 def rows(scenes: dict[int, Scene]) -> Iterator[str]:
@@ -135,8 +140,8 @@ def _rows_of(scene: Scene, target: str, layout: str) -> Iterator[str]:
     for engine in ENGINES[target]:
         head = f"| {target} | {layout} | {scene.shape_count} | {depth:.1f} | {size:,} | {engine} |"
         found = in_time(scene, target, layout, engine)
-        if found is None:
-            yield f"{head} | over {SECONDS} | | |"
+        if isinstance(found, str):
+            yield f"{head} {found} | | | |"
         else:
             yield (
                 f"{head} {found.compile:.2f} | {found.first:.2f} | {found.frame:.3f} | {found.error:.3f} |"

@@ -19,7 +19,6 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..blend import grid_point
 from ..expr import (
     FLOAT,
     VEC2,
@@ -30,6 +29,7 @@ from ..expr import (
     constant,
     function,
     length,
+    let,
     scalarize,
     substitute,
     var,
@@ -42,14 +42,19 @@ from ..shapes import KINDS, Parameter
 from .records import P
 from .tiles import Grid, layer_bounds
 
-LIMIT = 0.9  # 8-bit levels: largest error of the picture; drawing adds less than 0.1
+LIMIT = 0.95  # 8-bit levels: largest error of the picture; drawing adds less than 0.05
 CANVAS = (1920, 1080)  # pixels, for which the error is measured
 WORD = 30  # bits
 SAMPLE = 1 << 21  # layers × pixels that are looked at where no kernels are worth compiling
 CELLS = 16  # along the longer side of the grid
 CELL_BITS = 4
 CHOICE_BITS = 3  # say how many more bits than the least a layer's fractions have
-MOST_BITS = 24  # of a fraction: what a float holds
+LEAST_BITS, MOST_BITS = 4, 24  # of a fraction; a float holds no more
+FEWER = 5  # bits that all layers begin without, when the fewest are looked for
+ROUNDS = 24
+WORST = 4096  # pixels that are looked at in each round
+
+Floats = NDArray[np.float32]
 
 CORNER, BOX, SPAN = var("corner", VEC2), var("box", VEC2), length(var("box", VEC2))
 V = tuple(var(f"v[{i}]") for i in range(8))
@@ -70,15 +75,6 @@ class Precision:
 
 FIELDS = ("places", "falloff", "color", "opacity")
 FINEST = Precision(14.0, 20, 16, 16)
-# What is tried last, the most bits first.
-COARSENING = (
-    ("places", -1),
-    ("places", -0.5),
-    ("color", -1),
-    ("falloff", -1),
-    ("opacity", -1),
-    ("places", -0.25),
-)
 
 
 @dataclass(frozen=True)
@@ -121,10 +117,11 @@ def dequantised(parameter: Parameter, fractions: Sequence[Expr], ranges: Ranges)
     return vec2(*values) if parameter.type is VEC2 else values[0]
 
 
-@function("squared", v=FLOAT, largest=FLOAT)
-def squared(v: Expr, largest: Expr) -> Expr:
+@function("grown", v=FLOAT, largest=FLOAT)
+def grown(v: Expr, largest: Expr) -> Expr:
     """A length from its fraction, finer near 0."""
-    return v * v * largest
+    square = let("square", v * v)
+    return square * square * largest
 
 
 def linear(v: Expr, limits: tuple[float, float]) -> Expr:
@@ -180,13 +177,41 @@ def pack(scene: Scene, slack: float = 0.0, limit: float = LIMIT) -> Packed:
     """The scene in the fewest bits that keep its picture within `limit` levels on a full HD canvas."""
     packer = _Packer(scene, slack)
     if not scene.layers:
-        return packer.pack(Precision(), 0.0)
-    picture = _picture(scene)
+        return packer.pack(Precision(), [], 0.0)
+    view = _View(scene)
+    picture = view.picture(scene)
+    limit = limit if view.whole else limit / 3.0  # a sample may miss the worst pixel
 
     def error(precision: Precision) -> float:
-        return float(np.abs(_picture(packer.quantised(precision)) - picture).max()) * 255.0
+        return _largest(view.picture(packer.quantised(precision, packer.bit_counts(precision))) - picture)
 
-    return packer.pack(*choose_precision(error, limit))
+    precision, found = choose_precision(error, limit)
+    counts, found = _fewest_bits(packer, view, precision, limit) or (packer.bit_counts(precision), found)
+    return packer.pack(precision, counts, found)
+
+
+def _largest(difference: Floats) -> float:
+    return float(np.abs(difference).max()) * 255.0
+
+
+def _fewest_bits(
+    packer: _Packer, view: _View, precision: Precision, limit: float
+) -> tuple[list[int], float] | None:
+    """Bits of each layer's fractions: few at first, more for those whose edges pass where the picture is off.
+
+    None where that does not end.
+    """
+    counts = np.array(packer.bit_counts(precision)) - FEWER
+    picture = view.picture(packer.scene)
+    for _ in range(ROUNDS):
+        counts = np.maximum(counts, max(LEAST_BITS, counts.max() - 2**CHOICE_BITS + 1))
+        off = np.abs(view.picture(packer.quantised(precision, counts.tolist())) - picture).max(axis=0) * 255.0
+        if off.max() <= limit:
+            return counts.tolist(), float(off.max())
+        worst = np.argsort(-off, kind="stable")[:WORST]
+        counts[packer.to_blame(view, worst[off[worst] > limit], counts)] += 1
+        counts = np.minimum(counts, MOST_BITS)
+    return None
 
 
 def choose_precision(error: Callable[[Precision], float], limit: float) -> tuple[Precision, float]:
@@ -194,7 +219,7 @@ def choose_precision(error: Callable[[Precision], float], limit: float) -> tuple
 
     Halving a step halves its error, so one look at each field tells about how many bits it wants.
     """
-    start, share = Precision(), 0.4 * limit
+    start, share = Precision(), 0.6 * limit
     alone = {field: error(replace(FINEST, **{field: getattr(start, field)})) for field in FIELDS}
     precision = start
     for field, seen in alone.items():
@@ -205,42 +230,54 @@ def choose_precision(error: Callable[[Precision], float], limit: float) -> tuple
         if found > 1.5 * limit:
             precision = precision.finer("color").finer("opacity")
         found = error(precision)
-    for field, steps in COARSENING:
-        coarser = precision.finer(field, steps)
-        if (more := error(coarser)) <= limit:
-            precision, found = coarser, more
     return precision, found
 
 
-def _picture(scene: Scene) -> NDArray[np.float32]:
-    """The scene's pixels on a full HD canvas, [4, P]: all of them, or of a small scene an even sample."""
-    import torch
+class _View:
+    """The pixels at which pictures are compared: a full HD canvas, or of a small scene an even sample of it."""
 
-    from ..render import reference
-    from ..render.draw import LARGE, draw
-    from ..render.fused import threads_of_its_own
-    from ..render.tensors import from_scene
+    def __init__(self, scene: Scene) -> None:
+        from ..render import reference
+        from ..render.draw import LARGE
+        from ..render.tensors import from_scene
 
-    width, height = _canvas_size(scene)
-    if len(scene.layers) * width * height >= LARGE:
-        pixels: NDArray[np.float32] = draw(scene, width, height).numpy()
-        return pixels.reshape(4, -1)
-    step = max(1, math.isqrt(len(scene.layers) * width * height // SAMPLE))
-    with torch.no_grad(), threads_of_its_own():
-        tensors = from_scene(scene)
-        x, y, pixel = reference.canvas(tensors, width, height)
-        x, y = (values.reshape(height, width)[::step, ::step].flatten() for values in (x, y))
-        sample: NDArray[np.float32] = reference.displayed(
-            reference.composite_points(tensors, x, y, pixel)
-        ).numpy()
-        return sample
+        self.width, self.height = CANVAS if scene.width >= scene.height else CANVAS[::-1]
+        pixels = len(scene.layers) * self.width * self.height
+        self.whole = pixels >= LARGE
+        step = 1 if self.whole else max(1, math.isqrt(pixels // SAMPLE))
+        x, y, self.pixel = reference.canvas(from_scene(scene), self.width, self.height)
+        self.x, self.y = (v.reshape(self.height, self.width)[::step, ::step].flatten() for v in (x, y))
 
+    def picture(self, scene: Scene) -> Floats:
+        """The scene's pixels, [4, P]."""
+        import torch
 
-def _canvas_size(scene: Scene) -> tuple[int, int]:
-    """The picture's size within the canvas, whichever way round that suits it."""
-    across, down = CANVAS if scene.width >= scene.height else CANVAS[::-1]
-    scale = min(across / scene.width, down / scene.height)
-    return max(1, round(scene.width * scale)), max(1, round(scene.height * scale))
+        from ..render import reference
+        from ..render.draw import draw
+        from ..render.fused import threads_of_its_own
+        from ..render.tensors import from_scene
+
+        if self.whole:
+            pixels: Floats = draw(scene, self.width, self.height).numpy()
+            return pixels.reshape(4, -1)
+        with torch.no_grad(), threads_of_its_own():
+            image = reference.composite_points(from_scene(scene), self.x, self.y, self.pixel)
+            sample: Floats = reference.displayed(image).numpy()
+            return sample
+
+    def coverages(self, scene: Scene, chosen: NDArray[np.int64]) -> Floats:
+        """Coverage of every layer at some of the pixels, [L, B]."""
+        import torch
+
+        from ..render import reference
+        from ..render.tensors import from_scene
+
+        found = np.zeros((len(scene.layers), len(chosen)), np.float32)
+        with torch.no_grad():
+            for group in from_scene(scene).groups:
+                cover, _ = reference.group_coverage(group, self.x[chosen], self.y[chosen], self.pixel)
+                found[group.order.numpy()] = cover.numpy()
+        return found
 
 
 class _Packer:
@@ -254,9 +291,8 @@ class _Packer:
         self.grid, self.cells = _cell_boxes(scene, slack)
         self.finest = min(CANVAS)
 
-    def quantised(self, precision: Precision) -> Scene:
-        """The scene as a shader will read it."""
-        counts = self.bit_counts(precision)
+    def quantised(self, precision: Precision, counts: Sequence[int]) -> Scene:
+        """The scene as a shader will read it, with so many bits for the fractions of each layer."""
         layers = [
             self._layer(layer, cells, count, precision)[1]
             for layer, cells, count in zip(self.scene.layers, self.cells, counts, strict=True)
@@ -270,18 +306,30 @@ class _Packer:
             for layer, cells in zip(self.scene.layers, self.cells, strict=True)
         ]
         highest = min(MOST_BITS, max(wanted, default=0))
-        least = max(4, highest - 2**CHOICE_BITS + 1)
+        least = max(LEAST_BITS, highest - 2**CHOICE_BITS + 1)
         return [min(max(count, least), highest) for count in wanted]
 
     def _wanted(self, layer: Layer, cells: tuple[int, ...], precision: Precision) -> int:
+        turning = any(parameter.unit in ("angle", "frequency") for parameter in KINDS[layer.kind].parameters)
+        return math.ceil(math.log2(self._steepness(layer, cells)) + precision.places + 2 * turning)
+
+    def _steepness(self, layer: Layer, cells: tuple[int, ...]) -> float:
+        """How much a picture changes when the layer moves by the size of its cells, in full steps of colour."""
         softness = max(layer.falloff, 1.6 / self.finest) / max(abs(layer.opacity), 0.05)
         sizes = (cells[2] - cells[0] + 1, cells[3] - cells[1] + 1)
-        span = math.hypot(*sizes) / self.grid.per_unit
-        turning = any(parameter.unit in ("angle", "frequency") for parameter in KINDS[layer.kind].parameters)
-        return math.ceil(math.log2(span / softness) + precision.places + 2 * turning)
+        return math.hypot(*sizes) / self.grid.per_unit / softness
 
-    def pack(self, precision: Precision, error: float) -> Packed:
-        counts = self.bit_counts(precision)
+    def to_blame(
+        self, view: _View, chosen: NDArray[np.int64], counts: NDArray[np.int64]
+    ) -> NDArray[np.int64]:
+        """The layers whose coarse places can be why the picture is off at some pixels."""
+        cover = view.coverages(self.scene, chosen)
+        steep = np.array([self._steepness(*pair) for pair in zip(self.scene.layers, self.cells, strict=True)])
+        share = cover * (1.0 - cover) * (steep * 0.5**counts)[:, None]
+        guilty = (share >= 0.5 * share.max(axis=0)) & (share > 0.0)
+        return np.nonzero(guilty.any(axis=1))[0]
+
+    def pack(self, precision: Precision, counts: Sequence[int], error: float) -> Packed:
         least = min(counts, default=1)
         stream = _Stream()
         for layer, cells, count in zip(self.scene.layers, self.cells, counts, strict=True):
@@ -388,8 +436,8 @@ class _Coder:
         return low + (high - low) * self._fraction(fraction, bits)
 
     def root(self, value: float, largest: float, bits: int) -> float:
-        fraction = math.sqrt(value / largest) if largest else 0.0
-        return largest * self._fraction(fraction, bits) ** 2
+        fraction = (value / largest) ** 0.25 if largest else 0.0
+        return largest * self._fraction(fraction, bits) ** 4
 
     def _fraction(self, fraction: float, bits: int) -> float:
         most = (1 << bits) - 1
@@ -465,9 +513,8 @@ class PackedText:
         packed, bits = self.packed, self.packed.precision
         low, high = var("low", VEC2), var("high", VEC2)
         corner = vec2(*map(const, packed.grid.low)) + low * (1.0 / packed.grid.per_unit)
-        cells = vec2(const(packed.grid.per_unit))
         values = {
-            "place": grid_point(P, vec2(*map(const, packed.grid.low)), cells),
+            "place": (P - vec2(*map(const, packed.grid.low))) * packed.grid.per_unit,
             "corner": corner,
             "box": (high - low) * (1.0 / packed.grid.per_unit),
             "tint": linear_vector(var("tint", VEC3), packed.ranges.color),
@@ -512,10 +559,10 @@ class PackedText:
         if self.unions:
             fields["count"] = head(UNION_BITS)
         assert place <= WORD
-        fields["falloff"] = self._say(squared(part(bits.falloff), ranges.falloff))
+        fields["falloff"] = self._say(grown(part(bits.falloff), ranges.falloff))
         fields["opacity"] = self._say(linear(part(bits.opacity), ranges.opacity))
         if self.unions:
-            fields["smoothness"] = self._say(squared(part(bits.falloff), ranges.smoothness))
+            fields["smoothness"] = self._say(grown(part(bits.falloff), ranges.smoothness))
         most = max(map(fraction_count, self.kinds), default=1)
         longest = WORD + place + 3 * bits.color + most * (self.packed.least + 2**CHOICE_BITS - 1)
         return fields | {"head": place, "size": self._shape_bits(), "window": -(-longest // WORD) + 1}

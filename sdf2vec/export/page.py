@@ -24,25 +24,28 @@ def html(scene: Scene, options: Options) -> str:
     """A page that needs no network, with buttons that copy the scene in other forms."""
     plain = Options(title=options.title)
     made = shader(scene, "glsl", replace(plain, layout="data"))
-    texts = {"fragment": made.text} | _texts(scene, replace(plain, alone=True))
+    alone = replace(plain, alone=True)
+    texts = {name: shader(scene, name, alone).text for name in ("shadertoy", "glsl", "wgsl")}
+    drawing = _drawing(scene, plain)
     return template("page.html.jinja").render(
         scene=scene,
         title=one_line(options.title),
-        fallback=_inline(texts["svg"]) if "svg" in texts else _image(scene, plain),
+        fallback=drawing or _image(scene, plain),
         original=_data_url(options.original) if options.original else "",
-        labels={name: label for name, label in LABELS.items() if name in texts},
-        texts=json.dumps(texts, ensure_ascii=False).replace("<", "\\u003c"),
+        labels={name: label for name, label in LABELS.items() if name != "svg" or drawing},
+        texts=json.dumps({"fragment": made.text, **texts}, ensure_ascii=False).replace("<", "\\u003c"),
         data=base64.b64encode(_floats(made)).decode(),
         width=DATA_WIDTH,
     )
 
 
-def _texts(scene: Scene, options: Options) -> dict[str, str]:
-    texts = {name: shader(scene, name, options).text for name in ("shadertoy", "glsl", "wgsl")}
+def _drawing(scene: Scene, options: Options) -> str:
+    """The SVG as part of a page, or nothing where no drawing can show the scene."""
     try:
-        return texts | {"svg": svg(scene, options)}
-    except Sdf2vecError:  # no drawing can show such a scene
-        return texts
+        drawing = svg(scene, options)
+    except Sdf2vecError:
+        return ""
+    return drawing[drawing.index("<svg") :].strip()
 
 
 def _floats(made: Shader) -> bytes:
@@ -50,14 +53,8 @@ def _floats(made: Shader) -> bytes:
     return data.tobytes()
 
 
-def _inline(drawing: str) -> str:
-    """An SVG as part of a page: without its declaration, and as large as its place."""
-    start = drawing.index("<svg")
-    return drawing[start:].strip().replace("<svg", '<svg style="width:100%;height:100%"', 1)
-
-
 def _image(scene: Scene, options: Options) -> str:
-    return f'<img src="{_data_url(png(scene, options))}" alt="" style="width:100%;height:100%">'
+    return f'<img src="{_data_url(png(scene, options))}" alt="">'
 
 
 def _data_url(data: bytes) -> str:

@@ -93,7 +93,7 @@ class Shader:
         line = str(self.choice)
         if self.error:
             line += f", off by at most {self.error:.2f} levels"
-        if len(self.text) > TEXT_LIMIT:
+        if len(self.text) > TEXT_LIMIT and self.choice.layout != "data":
             line += f"; warning: more than {TEXT_LIMIT // 1024} KiB of text, which some hosts refuse"
         return line
 
@@ -104,9 +104,8 @@ def shader(scene: Scene, name: str, options: Options) -> Shader:
     target = TARGETS[name]
     choice = choose(scene, options.layout, _host(target, options))
     slack = BREATH if _moves(target, options) else 0.0
-    parts = _BODIES[choice.layout if scene.layers else "readable"](
-        _Job(scene, target, options, choice, slack)
-    )
+    job = _Job(scene, target, options, choice, slack)
+    parts = _BODIES[choice.layout if scene.layers else "readable"](job)
     data, error = parts.pop("array", None), parts.pop("error", 0.0)
     text = template(target.template).render(
         scene=scene,
@@ -116,6 +115,7 @@ def shader(scene: Scene, name: str, options: Options) -> Shader:
         version=GLSL_VERSIONS[options.glsl],
         output="gl_FragColor" if options.glsl == "es100" else "fragColor",
         motion=_motion(target, options),
+        display="" if job.is_displayable else "display",
         place=expression(surface_point(var(target.surface, VEC2), _size(scene)), target.dialect),
         **(dict.fromkeys(("table", "packed", "tiles", "data")) | {"layers": []} | parts),
     )
@@ -177,11 +177,18 @@ class _Job:
     def functions(self, roots: Iterable[Expr]) -> str:
         """Definitions of all functions that the formulas and the frame around them call."""
         moving = [breath(PIXEL, PIXEL)] if self.slack else []
-        found = used_functions([*roots, *moving, display(BELOW), *self._frame()])
+        shown = [] if self.is_displayable else [display(BELOW)]
+        found = used_functions([*roots, *moving, *shown, *self._frame()])
         brief = self.choice.layout == "packed"
         return ("\n" if brief else "\n\n").join(
             definition(f, self.dialect, documented=not brief) for f in found
         )
+
+    @property
+    def is_displayable(self) -> bool:
+        """Whether the scene's colours need no clamping: in the smallest text that is left out."""
+        opaque = self.scene.compositing == "over" and self.scene.background is not None
+        return self.choice.layout == "packed" and opaque
 
     def _frame(self) -> list[Expr]:
         """From a pixel, or a place on a surface, to a point."""
@@ -351,7 +358,7 @@ def _packed(job: _Job) -> dict[str, Any]:
         *text.distances,
         *_loop_roots(job.scene, text.unions),
         grid_point(P, P, P),
-        packing.squared(D, D),
+        packing.grown(D, D),
     ]
     part = text.part() | {"blend": COMPOSITING[job.scene.compositing].name, "coarsest": literal(COARSEST)}
     return {"functions": job.functions(roots), "packed": part, "error": packed.error}
