@@ -26,12 +26,12 @@ FLIP_RESOLUTION = 1000  # FLIP takes long: pictures of more pixels than the squa
 
 def fit(
     image: Any,
-    shapes: int = 256,
+    shapes: int | None = None,
     *,
     callback: Callable[[Progress], bool] | None = None,
     **options: Any,
 ) -> Scene:
-    """Fits `shapes` shapes to a picture.
+    """Fits `shapes` shapes to a picture: 256, or as many as the start scene has, unless told.
 
     `image`: a path, bytes, a file object, a PIL image or an array [H, W], [H, W, 3] or [H, W, 4] (sRGB-coded;
     integers, or floats 0..1). `callback` is called with the progress after every step and ends the fit by returning

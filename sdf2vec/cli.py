@@ -95,7 +95,9 @@ def _convert_parser() -> argparse.ArgumentParser:
 
 def _add_settings(group: argparse._ArgumentGroup) -> None:
     """The options of a fit; their names are those of `api.fit`."""
-    group.add_argument("--shapes", type=int, default=256, metavar="N", help="how many shapes (default: 256)")
+    group.add_argument(
+        "--shapes", type=int, metavar="N", help="how many shapes (default: 256, or as many as --start has)"
+    )
     group.add_argument(
         "--kind",
         default="triangle",
@@ -193,7 +195,8 @@ def _convert(arguments: list[str]) -> int:
         parser.error("no picture given")
     options = parser.parse_intermixed_args(arguments)
     targets = _targets(options.emit, "glsl")
-    jobs = _plan(options.inputs, targets, options.output)
+    also_read = [path for path in (options.start, options.weights) if path is not None]
+    jobs = _plan(options.inputs, targets, options.output, also_read)
     _check_settings(options, targets)
     status = OK
     for job in jobs:
@@ -341,14 +344,16 @@ def _targets(emit: list[str] | None, default: str) -> list[str]:
     return targets
 
 
-def _plan(inputs: list[str], targets: list[str], output: str | None) -> list[_Job]:
+def _plan(
+    inputs: list[str], targets: list[str], output: str | None, also_read: Sequence[str] = ()
+) -> list[_Job]:
     """Which file each export goes to. Raises Sdf2vecError when two would share one, or one can't be written."""
     single = len(inputs) == len(targets) == 1
     if output == STREAM and not single:
         raise Sdf2vecError("standard output takes one input and one target; give a folder with -o")
     jobs = [_Job(source, _outputs(source, targets, output, single)) for source in inputs]
     taken: dict[str, str] = {}
-    sources = {str(Path(source).resolve()) for source in inputs if source != STREAM}
+    sources = {str(Path(source).resolve()) for source in (*inputs, *also_read) if source != STREAM}
     for job in jobs:
         for path in job.outputs.values():
             _claim(path, job.source, taken, sources)

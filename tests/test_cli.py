@@ -323,6 +323,8 @@ def test_same_seed_same_bytes(folder, run):
         (["photo.jpg", "text.png", "-o", "-"], ["standard output"]),
         (["photo.jpg", "-o", "photo.jpg"], ["photo.jpg", "overwrite"]),
         (["photo.jpg", "-o", "sub/../link.jpg"], ["overwrite"]),
+        (["photo.jpg", "--start", "good.scene.json", "-o", "good.scene.json"], ["overwrite"]),
+        (["photo.jpg", "--weights", "sub/photo.png", "-o", "sub/photo.png"], ["overwrite"]),
         (["photo.jpg", "sub/photo.png"], ["photo.glsl", "photo.jpg", "sub/photo.png"]),
         (["photo.jpg", "photo.jpg"], ["photo.glsl"]),
         (["-", "-"], ["picture.glsl"]),

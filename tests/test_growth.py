@@ -42,7 +42,8 @@ def drawn(scene: Scene, channels: int) -> torch.Tensor:
 
 @pytest.mark.parametrize("compositing", ["over", "additive"])
 @pytest.mark.parametrize("transparent", [False, True])
-def test_importance_is_what_the_image_loses(monkeypatch, compositing, transparent):
+@pytest.mark.parametrize("weighted", [False, True])
+def test_importance_is_what_the_image_loses(monkeypatch, compositing, transparent, weighted):
     """Against leaving each layer out; the probes' spread is that of a mean of squares, at most √(2/probes)."""
     monkeypatch.setattr(growth, "PROBES", 1500)
     scene = random_scene(
@@ -50,13 +51,15 @@ def test_importance_is_what_the_image_loses(monkeypatch, compositing, transparen
     )
     channels = 4 if transparent else 3
     full = drawn(scene, channels)
-    expected = torch.tensor(
-        [float((full - drawn(without(scene, i), channels)).square().sum()) for i in range(7)]
-    )
+    weights = torch.linspace(0.0, 1.0, 18).expand(12, 18) if weighted else None
+    changes = [
+        (full - drawn(without(scene, i), channels)) * (1 if weights is None else weights) for i in range(7)
+    ]
+    expected = torch.tensor([float(change.square().sum()) for change in changes])
     tensors = from_scene(scene)
     adam(tensors)
     image = composite(tensors, 18, 12)[:channels]
-    scores = importance(image, tensors, seeded())
+    scores = importance(image, tensors, seeded(), weights)
     estimate = torch.empty(7)
     for group, score in zip(tensors.groups, scores, strict=True):
         estimate[group.order] = score / 1500

@@ -19,8 +19,15 @@ PROBES = 8  # random images that estimate what a layer does to the picture
 ROOM = 0.8  # size of a new shape, in radii of the disc whose place it takes: its falloff lies outside of that
 
 
-def importance(image: torch.Tensor, tensors: SceneTensors, generator: torch.Generator) -> list[torch.Tensor]:
+def importance(
+    image: torch.Tensor,
+    tensors: SceneTensors,
+    generator: torch.Generator,
+    weights: torch.Tensor | None = None,
+) -> list[torch.Tensor]:
     """How much the image changes, squared and summed, when a layer is left out: [G] for each group; an estimate.
+
+    `weights` [H, W] scale the change at each pixel.
 
     The image [C, H, W], before clamping, depends linearly on a layer's opacity (under `additive`, on its colours, and
     its alpha on the opacity), so that its derivative times that is the change; random signs r give
@@ -30,6 +37,8 @@ def importance(image: torch.Tensor, tensors: SceneTensors, generator: torch.Gene
     totals = [torch.zeros(len(group.order)) for group in tensors.groups]
     for _ in range(PROBES):
         signs = (torch.randint(0, 2, image.shape, generator=generator).float() * 2 - 1).to(image.device)
+        if weights is not None:
+            signs = signs * weights
         grads = torch.autograd.grad(
             (image * signs).sum(),  # torch imports a whole algebra system when it is given the signs
             [leaf for _, leaf in leaves],

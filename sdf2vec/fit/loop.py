@@ -213,7 +213,7 @@ class Fit:
         before = [group.each(lambda tensor: tensor.detach().clone()) for group in self.tensors.groups]
         image = self._draw(self.tensors, stage.target)
         loss = float(stage.measure(image).detach())
-        scores = self._scores(image)
+        scores = self._scores(image, stage)
         places = place(
             stage.target.cpu(), self.size, _layers_of(self.settings), count, ANYWHERE, self.generator
         )
@@ -251,7 +251,7 @@ class Fit:
         if count == 0:
             return
         image = self._draw(self.tensors, stage.target)
-        scores = self._scores(image)
+        scores = self._scores(image, stage)
         layers = _layers_of(self.settings)
         fresh = newcomers(image, stage.target, count, self.tensors, layers, self.generator, stage.weights)
         exchange(self.tensors, self.optimizer, least(scores, count), fresh)
@@ -261,9 +261,9 @@ class Fit:
         """How many layers are of as many shapes as new ones, so that the number of shapes stays."""
         return sum(len(g.order) for g in self.tensors.groups if g.union_size == self.settings.union)
 
-    def _scores(self, image: torch.Tensor) -> list[torch.Tensor]:
+    def _scores(self, image: torch.Tensor, stage: Stage) -> list[torch.Tensor]:
         """The importance of each group's layers; infinite where they can't be replaced."""
-        scores = importance(image, self.tensors, self.generator)
+        scores = importance(image, self.tensors, self.generator, stage.weights)
         return [
             score if group.union_size == self.settings.union else torch.full_like(score, math.inf)
             for score, group in zip(scores, self.tensors.groups, strict=True)

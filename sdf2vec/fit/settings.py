@@ -25,6 +25,7 @@ MIXED = "mixed"
 LOSS_NAMES = ("l1", "mse", "ssim", "flip")
 DEVICES = ("auto", "cpu", "cuda", "mps")
 MOST_COLORS = 256
+SHAPES = 256  # when nobody says how many
 LARGEST_AREA = 0.1  # share of the canvas
 
 
@@ -68,7 +69,7 @@ def preset_of(settings: Settings) -> Preset:
 
 
 def settings_of(
-    shapes: int = 256,
+    shapes: int | None = None,
     *,
     kind: str | Sequence[str] = "triangle",
     compositing: str | None = None,
@@ -88,15 +89,15 @@ def settings_of(
     kinds = kinds_of(kind)
     check_choice("preset", preset, tuple(PRESETS))
     check_choice("device", device, DEVICES)
-    _check_whole("number of shapes", shapes, 1, MAX_SHAPES)
     _check_whole("seed", seed, 0, 2**63 - 1)
     _check_whole("number of shapes joined (union)", union, 1, MAX_UNION)
     _check_whole("number of trials", trials, 0, 10_000)
+    scene = _scene_of(start)
+    shapes = _count_of(shapes, scene)
     if shapes % union:
         raise Sdf2vecError(f"{shapes} shapes can't be joined by {union}: choose a multiple of {union}")
-    scene = _scene_of(start)
     settings = Settings(
-        int(shapes),
+        shapes,
         kinds,
         _compositing(compositing, preset, scene),
         preset,
@@ -122,6 +123,13 @@ def _scene_of(start: Any) -> Scene | None:
     if not isinstance(start, str | os.PathLike):
         raise Sdf2vecError(f"the start is a scene or the path of its file, got {type(start).__name__}")
     return load_scene(start)
+
+
+def _count_of(shapes: int | None, start: Scene | None) -> int:
+    if shapes is None:
+        return start.shape_count if start is not None and start.shape_count else SHAPES
+    _check_whole("number of shapes", shapes, 1, MAX_SHAPES)
+    return int(shapes)
 
 
 def _area_of(share: Any) -> float | None:
