@@ -127,8 +127,9 @@ def test_constant_tables_have_a_limit(require_engine):
 
 @pytest.mark.parametrize("layout", [*EXACT, "packed"])
 @pytest.mark.parametrize("size", [(1, 1), (100, 10), (3, 200)])
-def test_odd_canvases(layout, size, require_engine):
+def test_odd_canvases(layout, size, require_engine, monkeypatch):
     require_engine("opengl")
+    monkeypatch.setattr(packing, "SAMPLE", 1 << 21)  # a picture that is a strip of the canvas
     scene = random_scene(width=size[0], height=size[1], seed=8, layers=9)
     made = shader(scene, "glsl", Options(layout=layout))
     for canvas in (size, (50, 130)):

@@ -45,7 +45,7 @@ from .tiles import Grid, layer_bounds
 LIMIT = 0.95  # 8-bit levels: largest error of the picture; drawing adds less than 0.05
 CANVAS = (1920, 1080)  # pixels, for which the error is measured
 WORD = 30  # bits
-SAMPLE = 1 << 21  # layers × pixels that are looked at where no kernels are worth compiling
+SAMPLE = 1 << 21  # shapes × pixels that are looked at where no kernels are worth compiling
 CELLS = 16  # along the longer side of the grid
 CELL_BITS = 4
 CHOICE_BITS = 3  # say how many more bits than the least a layer's fractions have
@@ -242,9 +242,9 @@ class _View:
         from ..render.tensors import from_scene
 
         self.width, self.height = CANVAS if scene.width >= scene.height else CANVAS[::-1]
-        pixels = len(scene.layers) * self.width * self.height
-        self.whole = pixels >= LARGE
-        step = 1 if self.whole else max(1, math.isqrt(pixels // SAMPLE))
+        pixels = self.width * self.height
+        self.whole = len(scene.layers) * pixels >= LARGE
+        step = 1 if self.whole else max(1, math.isqrt(scene.shape_count * pixels // SAMPLE))
         x, y, self.pixel = reference.canvas(from_scene(scene), self.width, self.height)
         self.x, self.y = (v.reshape(self.height, self.width)[::step, ::step].flatten() for v in (x, y))
 
