@@ -5,6 +5,8 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, field
+from functools import lru_cache
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,8 +17,10 @@ from .export import export
 from .export.options import SVG_PROFILES, Options
 from .export.shader import TARGETS, shader
 from .image import fitted_size, premultiply
-from .render.reference import render
 from .scene import Scene
+
+if TYPE_CHECKING:
+    from torch import Tensor
 
 Pixels = NDArray[np.float32]  # [height, width, 4] premultiplied RGBA
 Size = tuple[int, int]
@@ -106,6 +110,19 @@ def _small(width: int, height: int) -> Size:
     return width // common * min(times, common), height // common * min(times, common)
 
 
+@lru_cache(maxsize=4)
+def _expected(scene: Scene, width: int, height: int) -> Tensor:
+    """The reference in float64; for large jobs, which would take it minutes, the fused renderer."""
+    import torch
+
+    from .render.draw import draw, is_large
+    from .render.reference import render
+
+    if is_large(scene, width, height):
+        return draw(scene, width, height)
+    return render(scene, width, height, dtype=torch.float64)
+
+
 def _check_trip(scene: Scene, trip: RoundTrip, sizes: Sequence[Size]) -> list[Check]:
     reason = ENGINES[trip.engine].missing()
     if reason:
@@ -130,7 +147,11 @@ def figure(scene: Scene, target: str, data: str | bytes, options: Options) -> Ch
         suits = trip.target != "svg" or trip.options.svg_profile == options.svg_profile
         if suits and not ENGINES[trip.engine].missing():
             beside = _exported(scene, target, options)[1] if target in TARGETS else None
-            return compare(trip, data, scene, default_sizes(scene, trip)[0], beside)
+            width, height = default_sizes(scene, trip)[0]
+            from .render.draw import draw_fast
+
+            expected = draw_fast(scene, width, height)
+            return compare(trip, data, scene, (width, height), beside, expected)
     return None
 
 
@@ -144,14 +165,20 @@ def _exported(scene: Scene, target: str, options: Options) -> tuple[str, Pixels 
     return text, None
 
 
-def compare(trip: RoundTrip, text: str, scene: Scene, size: Size, data: Pixels | None = None) -> Check:
-    """One export (and the data beside it) drawn at one size, against the torch render in float64."""
-    import torch
-
+def compare(
+    trip: RoundTrip,
+    text: str,
+    scene: Scene,
+    size: Size,
+    data: Pixels | None = None,
+    expected: Tensor | None = None,
+) -> Check:
+    """One export (and the data beside it) drawn at one size, against a render [4, H, W], by default `_expected`."""
     width, height = size
     drawn = trip.draw(text, width, height, data)
-    expected = render(scene, width, height, dtype=torch.float64).permute(1, 2, 0).numpy()
-    difference = 255.0 * (drawn.astype(np.float64) - expected)
+    if expected is None:
+        expected = _expected(scene, width, height)
+    difference = 255.0 * (drawn.astype(np.float64) - expected.permute(1, 2, 0).double().numpy())
     error = float(np.mean(difference**2))
     return Check(
         trip.name,

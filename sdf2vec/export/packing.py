@@ -238,12 +238,12 @@ class _View:
 
     def __init__(self, scene: Scene) -> None:
         from ..render import reference
-        from ..render.draw import LARGE
+        from ..render.draw import is_large
         from ..render.tensors import from_scene
 
         self.width, self.height = CANVAS if scene.width >= scene.height else CANVAS[::-1]
         pixels = self.width * self.height
-        self.whole = len(scene.layers) * pixels >= LARGE
+        self.whole = is_large(scene, self.width, self.height)
         step = 1 if self.whole else max(1, math.isqrt(scene.shape_count * pixels // SAMPLE))
         x, y, self.pixel = reference.canvas(from_scene(scene), self.width, self.height)
         self.x, self.y = (v.reshape(self.height, self.width)[::step, ::step].flatten() for v in (x, y))

@@ -17,9 +17,14 @@ def draw(scene: Scene, width: int | None = None, height: int | None = None) -> t
     The same numbers every time: what has been compiled before does not count.
     """
     width, height = width or scene.width, height or scene.height
-    if len(scene.layers) * width * height < LARGE:
-        return reference.render(scene, width, height)
-    return _drawn_fused(from_scene(scene), width, height)
+    if is_large(scene, width, height):
+        return _drawn_fused(from_scene(scene), width, height)
+    return reference.render(scene, width, height)
+
+
+def is_large(scene: Scene, width: int, height: int) -> bool:
+    """Whether the reference would take long, so that compiling kernels pays."""
+    return len(scene.layers) * width * height >= LARGE
 
 
 def draw_fast(scene: Scene, width: int, height: int) -> torch.Tensor:
