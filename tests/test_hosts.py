@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 import sdf2vec
-from sdf2vec.engines import chromium, glslang_validate, opengl, shadertoy, threejs, webgl
-from sdf2vec.export import packing
+from sdf2vec.engines import chromium, glslang_validate, opengl, shadertoy, threejs, webgl, webgpu
+from sdf2vec.export import export, packing
 from sdf2vec.export.options import Options
 from sdf2vec.export.shader import shader
 from sdf2vec.render import reference
@@ -145,10 +145,36 @@ def test_a_fitted_photo_in_a_browser(photo, require_engine):
         text = SHADERTOY_HEAD + made.text + SHADERTOY_TAIL if target == "shadertoy" else made.text
         for width, height in ((150, 100), (107, 60), (64, 64)):
             uniforms = {"resolution": (width, height), "iResolution": (width, height, 1.0)}
-            drawn = np.round(255 * webgl.render(text, width, height, uniforms, made.data))
-            difference = drawn - 255 * rendered(scene, width, height)
-            assert 10 * np.log10(255**2 / np.mean(difference**2)) >= 55
-            assert abs(difference.mean()) <= 0.1
+            assert_alike(webgl.render(text, width, height, uniforms, made.data), scene)
+
+
+def assert_alike(drawn, scene):
+    """At least 55 dB from 8 bits, neither darker nor brighter."""
+    height, width, channels = drawn.shape
+    difference = np.round(255 * drawn) - 255 * rendered(scene, width, height)[..., :channels]
+    assert 10 * np.log10(255**2 / np.mean(difference**2)) >= 55
+    assert abs(difference.mean()) <= 0.1
+
+
+def test_a_fitted_photo_by_webgpu(photo, require_engine):
+    require_engine("webgpu")
+    for layout in ("readable", "data"):
+        made = shader(photo, "wgsl", Options(layout=layout))
+        for width, height in ((150, 100), (107, 60), (64, 64)):
+            uniforms = {"resolution": (width, height)}
+            assert_alike(webgpu.render(made.text, width, height, uniforms=uniforms, texture=made.data), photo)
+
+
+def test_a_fitted_photo_on_a_page(photo, require_engine):
+    require_engine("chromium")
+    text = export(photo, "html", Options())
+    for window in ((332, 400), (232, 200), (110, 600)):
+        with chromium.opened({"index.html": text}, *window) as page:
+            page.wait_for_function("document.querySelector('canvas').width > 1")
+            page.wait_for_timeout(300)
+            size = "[document.querySelector('canvas').width, document.querySelector('canvas').height]"
+            width, height = page.evaluate(size)
+            assert_alike(chromium.screenshot(page, "canvas")[:height, :width, :3], photo)
 
 
 def test_the_default_shadertoy_of_256_shapes(photo, require_engine):
