@@ -375,7 +375,7 @@ def test_settings_are_refused_before_any_work(folder, run, monkeypatch):
     monkeypatch.setattr("sdf2vec.api.fit", lambda *_, **__: pytest.fail("the fit began"))
     for bad in (
         ["--emit", "eps"],
-        ["--compositing", "additive", "--emit", "json,svg", "--svg-profile", "portable"],
+        ["--compositing", "additive", "--colors", "4"],
         ["--size", "-1"],
         ["-o", "photo.jpg/sub/"],
     ):

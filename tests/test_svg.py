@@ -145,11 +145,38 @@ def test_layers_come_in_draw_order():
     assert fills == [f"#{i:x}00" for i in range(16)]
 
 
-def test_additive_where_nothing_can_be_added_is_refused_in_one_line():
-    with pytest.raises(Sdf2vecError, match=r"^svg: without blend modes .* --compositing over$"):
-        text_of(Scene(3, 2, (), compositing="additive"), svg_profile="portable")
-    with pytest.raises(Sdf2vecError, match=r"^svg: additive scenes on a transparent ground .*$"):
-        text_of(Scene(3, 2, (), None, compositing="additive"))
+@pytest.mark.parametrize("profile", ["portable", "filters"])
+def test_additive_where_nothing_can_be_added_is_fitted_again_and_said(profile, require_engine):
+    require_engine("resvg")
+    ground = (0.4, 0.5, 0.3) if profile == "portable" else None
+    turned: Parameters = {"half_size": (0.3, 0.15), "angle": 0.3, "corner_radius": 0}
+    lights = [
+        (Shape.of("circle", (0.3, 0.1, -0.2), center=(-0.2, 0.05), radius=0.25), 0.1, 1.0),
+        (Shape.of("circle", (-0.2, 0.2, 0.3), center=(0.1, 0.1), radius=0.3), 0.2, 1.0),
+        (Shape.of("box", (0.3, 0.3, 0.1), center=(0.2, -0.2), **turned), 0.05, 0.8),
+    ]
+    layers = tuple(Layer((shape,), falloff, opacity) for shape, falloff, opacity in lights)
+    scene = Scene(96, 64, layers, ground, "additive")
+    options = Options(svg_profile=profile)
+    text = write_svg(scene, options)
+    assert "difference" not in text
+    (said,) = notes(scene, options)
+    found = re.search(r"fitted again under over \(([\d.]+) dB from its render\)$", said)
+    assert found
+    decibels = float(found[1])
+    assert decibels >= 25.0
+    for size in ((96, 64), (192, 128)):
+        wanted = render(scene, *size).permute(1, 2, 0).numpy()
+        error = premultiply(ENGINES["resvg"].render(text, *size)) - wanted
+        assert -10 * np.log10(np.mean(error**2)) >= decibels - 1.5
+        assert abs(error.mean()) <= 0.01
+        assert (
+            -10 * np.log10(np.mean(error**2)) > -10 * np.log10(np.var(wanted)) + 10
+        )  # no even colour does that
+
+
+def test_an_empty_sum_is_its_ground():
+    assert "#808080" in text_of(Scene(3, 2, (), (0.5, 0.5, 0.5), "additive"), svg_profile="portable")
 
 
 def test_portable_has_neither_filters_nor_blend_modes():

@@ -57,7 +57,7 @@ EXPORTERS: dict[str, Exporter] = {
     "godot": _shader("godot", ".gdshader", "canvas item shader for Godot 4"),
     "svg": Exporter(".svg", svg.svg, "SVG that looks the same in every renderer", svg.notes),
     "data-uri": Exporter(".uri.txt", svg.data_uri, "that SVG as a data URI", svg.notes),
-    "pdf": Exporter(".pdf", svg.pdf, "the portable SVG as PDF, by CairoSVG"),
+    "pdf": Exporter(".pdf", svg.pdf, "the portable SVG as PDF, by CairoSVG", svg.pdf_notes),
     "html": Exporter(".html", page.html, "one page without dependencies: shader, drawing, copy buttons"),
     "component": Exporter(
         ".sdf-image.js", component.component, "<sdf-image>, an element that shows scene files"

@@ -50,8 +50,8 @@ class Written(NamedTuple):
 def svg(scene: Scene, options: Options) -> str:
     """The scene as SVG text in pixels of the fitted picture.
 
-    Raises Sdf2vecError for an additive scene that the profile or a transparent ground can't hold, and for a size limit
-    that can't be met.
+    An additive scene that the profile or a transparent ground can't hold is fitted again under `over` (`notes` says
+    how near that is). Raises Sdf2vecError for a size limit that can't be met.
     """
     return _written(scene, options).document.text(one_line(options.title))
 
@@ -59,6 +59,11 @@ def svg(scene: Scene, options: Options) -> str:
 def notes(scene: Scene, options: Options) -> tuple[str, ...]:
     """What the SVG of a scene gave up, a line each."""
     return _written(scene, options).notes
+
+
+def pdf_notes(scene: Scene, options: Options) -> tuple[str, ...]:
+    """What the PDF of a scene gave up, a line each."""
+    return notes(scene, replace(options, svg_profile=PORTABLE))
 
 
 def data_uri(scene: Scene, options: Options) -> str:
@@ -80,6 +85,10 @@ def pdf(scene: Scene, options: Options) -> bytes:
 
 def _written(scene: Scene, options: Options) -> Written:
     """The finest drawing that keeps to the size limit."""
+    if scene.compositing == "additive" and (options.svg_profile == PORTABLE or scene.background is None):
+        found, note = _without_sums(scene, options.svg_profile)
+        written = _written(found, options)
+        return Written(written.document, (note, *written.notes))
     title, limit = one_line(options.title), options.svg_size_limit
     if limit is None:
         return _drawing(scene, options.svg_profile, DETAILS[0])
@@ -101,8 +110,6 @@ def _coarser(detail: Detail, limit: int) -> str:
 @lru_cache(maxsize=16)
 def _drawing(scene: Scene, profile: str, detail: Detail) -> Written:
     additive = scene.compositing == "additive"
-    if additive:
-        _require_sums(scene, profile)
     document = Document(Canvas.of(scene, detail.coarser), detail.named, 0.0 if additive else LIFTS[profile])
     if scene.background is not None:
         document.body.append(tag("rect", width="100%", height="100%", fill=color_text(scene.background)))
@@ -116,16 +123,14 @@ def _drawing(scene: Scene, profile: str, detail: Detail) -> Written:
     return Written(document, found)
 
 
-def _require_sums(scene: Scene, profile: str) -> None:
-    if profile == PORTABLE:
-        raise Sdf2vecError(
-            "svg: without blend modes nothing can be added up; take --svg-profile filters, "
-            "or fit with --compositing over"
-        )
-    if scene.background is None:
-        raise Sdf2vecError(
-            "svg: additive scenes on a transparent ground can't be written; fit with --compositing over"
-        )
+def _without_sums(scene: Scene, profile: str) -> tuple[Scene, str]:
+    """An additive scene fitted again under `over`, and what a user should know about that."""
+    from ...fit.conversion import over_of
+
+    found, decibels = over_of(scene)
+    why = "without blend modes" if profile == PORTABLE else "on a transparent ground"
+    near = f" ({decibels:.1f} dB from its render)" if scene.layers else ""
+    return found, f"svg: nothing can be added up {why}: fitted again under over{near}"
 
 
 def _add_terms(scene: Scene, document: Document, painter: Painter) -> tuple[str, ...]:
