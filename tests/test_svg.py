@@ -193,6 +193,30 @@ def test_a_size_limit_is_kept_or_refused():
     assert any("drawn coarser" in note for note in notes(scene, Options(svg_size_limit=free // 2)))
     with pytest.raises(Sdf2vecError, match=r"^svg: [\d,]+ bytes at least, more than the limit of 500"):
         text_of(scene, svg_size_limit=500)
+    with pytest.raises(Sdf2vecError, match=r"bytes at least"):  # without filters it can't be as small
+        text_of(scene, svg_size_limit=40 * 170, svg_profile="portable")
+
+
+@pytest.mark.parametrize("engine", ["resvg", "chromium", "librsvg"])
+def test_the_smallest_drawing_still_looks_like_the_render(engine, require_engine):
+    require_engine(engine)
+    r = random.Random(5)
+    kinds = ("triangle", "box", "circle", "ellipse")
+    layers = []
+    for index in range(24):
+        falloff = (0.0, 0.06, 0.15, 0.3)[index // 4 % 4]
+        layers.append(Layer((random_shape(kinds[index % 4], r),), falloff, r.uniform(0.3, 1.0)))
+    scene = Scene(300, 200, tuple(layers), (0.3, 0.4, 0.5))
+    options = Options(svg_size_limit=24 * 170)
+    text = write_svg(scene, options)
+    (note,) = notes(scene, options)
+    assert "blurs alone" in note
+    (group,) = (element for element in ElementTree.fromstring(text) if element.tag == f"{NAMESPACE}g")
+    assert len(group) == 24
+    for size in ((300, 200), (600, 400)):
+        error = ENGINES[engine].render(text, *size) - render(scene, *size).permute(1, 2, 0).numpy()
+        assert -10 * np.log10(np.mean(error**2)) >= 34
+        assert abs(error.mean()) <= 1.0 / 255.0
 
 
 def test_a_data_uri_holds_the_svg():

@@ -18,11 +18,12 @@ from ..options import Options
 from .canvas import Canvas, Document, color_text, tag
 from .field import extent
 from .layers import Detail, Painter, Part, plan
+from .lean import GROUP
 from .sums import Term, alternating, terms
 
 PORTABLE = "portable"
 LIFTS = {
-    "filters": 0.4,
+    "filters": 0.35,
     PORTABLE: 0.2,
 }  # levels; what renderers lose, from none (resvg) to twice that (browsers)
 CREATED = re.compile(rb"(/CreationDate \(D:)([^)]*)")
@@ -37,6 +38,7 @@ DETAILS = (
     Detail(target=34.0, levels=1.2, coarser=1),
     Detail(target=30.0, levels=2.0, coarser=1, named=False),
     Detail(target=0.0, levels=4.0, coarser=1, named=False),
+    Detail(target=0.0, levels=4.0, coarser=1, named=False, lean=True),
 )
 
 
@@ -93,7 +95,8 @@ def _written(scene: Scene, options: Options) -> Written:
     if limit is None:
         return _drawing(scene, options.svg_profile, DETAILS[0])
     size = 0
-    for detail in DETAILS:
+    blurs = options.svg_profile != PORTABLE and scene.compositing == "over"
+    for detail in DETAILS if blurs else [detail for detail in DETAILS if not detail.lean]:
         written = _drawing(scene, options.svg_profile, detail)
         size = len(written.document.text(title).encode())
         if size <= limit:
@@ -103,6 +106,8 @@ def _written(scene: Scene, options: Options) -> Written:
 
 
 def _coarser(detail: Detail, limit: int) -> str:
+    if detail.lean:
+        return f"svg: drawn with blurs alone to stay below {limit:,} bytes"
     blurs = f", blurs down to {detail.target:g} dB" if detail.target else ", blurs for all polygons"
     return f"svg: drawn coarser to stay below {limit:,} bytes (edges to {detail.levels:g} levels{blurs})"
 
@@ -119,7 +124,8 @@ def _drawing(scene: Scene, profile: str, detail: Detail) -> Written:
     else:
         found = ()
         drawn = (painter.draw(Part(layer, index)) for index, layer in enumerate(scene.layers))
-        document.body += [element for element in drawn if element]
+        elements = [element for element in drawn if element]
+        document.body += [tag("g", "\n".join(elements), **GROUP)] if detail.lean and elements else elements
     return Written(document, found)
 
 

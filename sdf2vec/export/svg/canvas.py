@@ -103,6 +103,7 @@ class Document:
     named: bool = True
     lift: float = 0.0
     definitions: dict[str, str] = field(default_factory=dict)
+    styles: dict[str, str] = field(default_factory=dict)
     body: list[str] = field(default_factory=list)
 
     def define(self, kind: str, name: str, *children: str, **attributes: str | None) -> str:
@@ -111,6 +112,10 @@ class Document:
         if content not in self.definitions:
             self.definitions[content] = f"{ID_MARK}{kind}{len(self.definitions) + 1}"
         return self.definitions[content]
+
+    def style(self, rules: str) -> str:
+        """Adds a class with some rules and returns its name; the same one as before for equal rules."""
+        return self.styles.setdefault(rules, f"{ID_MARK}{_letters(len(self.styles))}")
 
     def color(self, color: Sequence[float]) -> str:
         """A layer's colour as it is written."""
@@ -124,12 +129,21 @@ class Document:
         """The whole SVG. Ids begin with a hash of the content, so that drawings can share a page."""
         definitions = [text.replace(OWN_ID, name, 1) for text, name in self.definitions.items()]
         lines = [tag("defs", "\n", *(f"{line}\n" for line in definitions))] if definitions else []
+        if self.styles:
+            rules = "".join(f".{name}{{{rules}}}" for rules, name in self.styles.items())
+            lines.append(f"<style>{rules}</style>")
         inner = "\n".join([*lines, *self.body])
         size = f'width="{self.canvas.width}" height="{self.canvas.height}"'
         head = f'<svg xmlns="http://www.w3.org/2000/svg" {size} viewBox="0 0 {self.canvas.width} {self.canvas.height}"'
         prefix = "s" + hashlib.sha256((head + inner).encode()).hexdigest()[:5]
         inner = inner.replace(ID_MARK, prefix)
         return f'{head} role="img">\n<title>{escape(title)}</title>\n{inner}\n</svg>\n'
+
+
+def _letters(index: int) -> str:
+    """A short name for each whole number: a, b, … z, ba, bb, …"""
+    rest, last = divmod(index, 26)
+    return (_letters(rest) if rest else "") + chr(ord("a") + last)
 
 
 def url(name: str) -> str:

@@ -14,6 +14,7 @@ from .canvas import Canvas, Document, opacity_text, tag, url
 from .curves import path_data
 from .field import Array, extent
 from .gradients import Paint, ellipse, sliced
+from .lean import lean
 from .outlines import core, element
 from .shading import fill_of
 from .stops import stop_count
@@ -31,12 +32,14 @@ class Detail:
 
     `levels`: the error, in 8-bit levels, that the stops of one shape's edge may leave, and times
     BANDS_COARSER the bands of a traced one. `coarser`: decimals fewer. `named`: ids on shapes.
+    `lean`: nothing but blurs, in the smallest text.
     """
 
     target: float = 46.0
     levels: float = 0.2
     coarser: int = 0
     named: bool = True
+    lean: bool = False
 
 
 @dataclass(frozen=True)
@@ -61,6 +64,8 @@ class Painter:
         layer = part.layer
         name = self.document.id_of(layer.kind, part.index)
         outline = edge_of(layer, 0.5)
+        if self.detail.lean and outline is not None:
+            return lean(layer, outline, is_soft(layer, self.canvas), self.document)
         if not is_soft(layer, self.canvas):
             return self._sharp(part, outline, name)
         if part.index in self.plan.blurred:
