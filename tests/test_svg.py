@@ -197,6 +197,20 @@ def test_a_size_limit_is_kept_or_refused():
         text_of(scene, svg_size_limit=40 * 170, svg_profile="portable")
 
 
+@pytest.mark.parametrize("engine", ["resvg", "cairosvg", "chromium"])
+def test_unions_of_many_colours_mix_as_in_the_render(engine, require_engine):
+    require_engine(engine)
+    r = random.Random(2)
+    for kind, falloff, opacity in (("circle", 0.05, 0.8), ("triangle", 0.1, 1.0), ("box", 0.0, 1.0)):
+        union = Layer(tuple(random_shape(kind, r) for _ in range(3)), falloff, opacity, 0.06)
+        scene = Scene(150, 100, (union,), (0.2, 0.3, 0.4))
+        text = write_svg(scene, Options(svg_profile="portable"))
+        for size in ((150, 100), (390, 260)):
+            error = ENGINES[engine].render(text, *size) - render(scene, *size).permute(1, 2, 0).numpy()
+            assert -10 * np.log10(np.mean(error**2)) >= 39, (kind, size)
+            assert abs(error.mean()) <= 1.0 / 255.0
+
+
 @pytest.mark.parametrize("engine", ["resvg", "chromium", "librsvg"])
 def test_the_smallest_drawing_still_looks_like_the_render(engine, require_engine):
     require_engine(engine)

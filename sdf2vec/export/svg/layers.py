@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -10,19 +11,22 @@ from ...scene import Layer, Scene
 from ...shapes import KINDS, EllipseOutline, Outline
 from .bands import band_count, band_levels, layer_contours
 from .blur import Blurred, best_blur
-from .canvas import Canvas, Document, opacity_text, tag, url
+from .canvas import Canvas, Document, Points, opacity_text, tag, url
 from .curves import path_data
 from .field import Array, extent
 from .gradients import Paint, ellipse, sliced
 from .lean import lean
 from .outlines import core, element
-from .shading import fill_of
+from .pieces import piece_contours
+from .shading import fill_of, is_mixed
 from .stops import stop_count
 from .weigh import contrasts
 
 SHARP = 2.0  # user units: an edge softer than this is drawn soft
 SMALL = 64.0  # user units along the shortest side: a picture smaller than this will be shown larger
 BANDS_COARSER = 4.0  # bands are dear, and their steps alternate in sign
+PIECES_COARSER = 8.0  # pieces are still dearer: every shape of a union has bands of its own
+MIXED = 7.5  # by so much more than the stops of an edge may a gradient through a union be off
 TOLERANCE = 0.05  # user units that a traced contour may be off
 
 
@@ -64,6 +68,8 @@ class Painter:
         layer = part.layer
         name = self.document.id_of(layer.kind, part.index)
         outline = edge_of(layer, 0.5)
+        if is_mixed(layer, self.canvas, MIXED * self.detail.levels):
+            return self._pieces(part, name)
         if self.detail.lean and outline is not None:
             return lean(layer, outline, is_soft(layer, self.canvas), self.document)
         if not is_soft(layer, self.canvas):
@@ -97,12 +103,11 @@ class Painter:
         bands = band_levels(self.plan.bands[part.index])
         tolerance = max(TOLERANCE, 0.15 * layer.falloff * self.canvas.unit / len(bands))
         found = layer_contours(layer, [end * layer.falloff for end, _ in bands], self.canvas)
-        paths, below = [], 0.0
-        for contours, (_, cover) in zip(found, bands, strict=True):
-            if contours:
-                added = opacity_text((cover - below) / (1.0 - below))
-                paths.append(tag("path", d=path_data(contours, tolerance, self.canvas), fill_opacity=added))
-            below = cover
+        covered = [(cover, contours) for contours, (_, cover) in zip(found, bands, strict=True)]
+        paths = [
+            tag("path", d=path_data(contours, tolerance, self.canvas), fill_opacity=added)
+            for contours, added in steps(covered)
+        ]
         if not paths:
             return ""
         look = {
@@ -110,6 +115,25 @@ class Painter:
             "opacity": opacity_text(layer.opacity),
         }
         return tag("g", *paths, id=name, fill_rule="evenodd", **look)
+
+    def _pieces(self, part: Part, name: str | None) -> str:
+        layer = part.layer
+        spread = float(np.var([shape.color for shape in layer.shapes], axis=0).mean()) * layer.opacity**2
+        count = max(self.plan.bands[part.index] // 2, band_count(spread, PIECES_COARSER * self.detail.levels))
+        tolerance = max(2.0 * TOLERANCE, 0.15 * layer.falloff * self.canvas.unit / count)
+        paths = []
+        pieces = piece_contours(layer, count, self.canvas)
+        for shape, bands in zip(layer.shapes, pieces, strict=True):
+            color = self.document.color(shape.color)
+            paths += [
+                tag("path", d=path_data(found, tolerance, self.canvas), fill=color, fill_opacity=added)
+                for found, added in steps(bands)
+            ]
+        return (
+            tag("g", *paths, id=name, fill_rule="evenodd", opacity=opacity_text(layer.opacity))
+            if paths
+            else ""
+        )
 
     def _blur(self, part: Part, blurred: Blurred, name: str | None) -> str:
         look = {
@@ -144,6 +168,15 @@ class Painter:
             "fill": fill_of(part.layer, self.document),
             "fill_opacity": opacity_text(part.layer.opacity),
         }
+
+
+def steps(bands: list[tuple[float, list[Points]]]) -> Iterator[tuple[list[Points], str | None]]:
+    """The contours of nested bands, and the opacity that each adds to reach its coverage."""
+    below = 0.0
+    for cover, contours in bands:
+        if contours:
+            yield contours, opacity_text((cover - below) / (1.0 - below))
+        below = cover
 
 
 def is_soft(layer: Layer, canvas: Canvas) -> bool:

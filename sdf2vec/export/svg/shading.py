@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+from functools import lru_cache
+from typing import NamedTuple
+
 import numpy as np
 
 from ...scene import Layer
 from .bands import seen
-from .canvas import Document, mean_color, number, tag, url
+from .canvas import Canvas, Document, mean_color, number, tag, url
 from .field import Array, colors, covers, grid_over
 
 STOPS = 7
@@ -14,18 +17,41 @@ CELLS = 48  # of the grid along the longest side
 SAME = 0.5 / 255.0
 
 
+class Shade(NamedTuple):
+    """A gradient: the places of its stops [S, 2] in scene units, their colours [S, 3], and how far it is off."""
+
+    places: Array
+    colors: Array
+    error: float
+
+
 def fill_of(layer: Layer, document: Document) -> str:
     """A colour, or a gradient along the direction in which the union's colour changes most."""
+    shade = shade_of(layer, document.canvas)
+    if shade is None:
+        return document.color(mean_color([shape.color for shape in layer.shapes]))
+    return url(_gradient(shade, document))
+
+
+def is_mixed(layer: Layer, canvas: Canvas, levels: float) -> bool:
+    """Whether a layer has colours that no gradient shows with an error below so many 8-bit levels."""
+    shade = shade_of(layer, canvas) if len(layer.shapes) > 1 else None
+    return shade is not None and 255.0 * shade.error * layer_weight(layer) > levels
+
+
+@lru_cache(maxsize=1024)
+def shade_of(layer: Layer, canvas: Canvas) -> Shade | None:
+    """The gradient nearest to a union's colours; None where there is but one, or nothing to see."""
     own = np.array([shape.color for shape in layer.shapes])
-    if np.ptp(own, axis=0).max() <= SAME:
-        return document.color(mean_color([shape.color for shape in layer.shapes]))
-    box = seen(layer, document.canvas)
+    box = seen(layer, canvas)
+    if np.ptp(own, axis=0).max() <= SAME or box.empty:
+        return None
     grid = grid_over(box, max(box.right - box.left, box.bottom - box.top) / CELLS)
-    weight = covers(layer, grid, 1.0 / document.canvas.unit).ravel() * layer_weight(layer)
+    weight = covers(layer, grid, 1.0 / canvas.unit).ravel() * layer_weight(layer)
     if weight.max() < 1e-3:
-        return document.color(mean_color([shape.color for shape in layer.shapes]))
+        return None
     places = np.stack([v.ravel() for v in np.meshgrid(grid.x, grid.y)], axis=1)
-    return url(_gradient(places, colors(layer, grid).reshape(3, -1).T, weight, document))
+    return _nearest(places, colors(layer, grid).reshape(3, -1).T, weight)
 
 
 def layer_weight(layer: Layer) -> float:
@@ -33,9 +59,8 @@ def layer_weight(layer: Layer) -> float:
     return max(abs(layer.opacity), 1e-3)
 
 
-def _gradient(places: Array, wanted: Array, weight: Array, document: Document) -> str:
-    """The gradient's id; least squares for its direction first, then for its stops."""
-    canvas = document.canvas
+def _nearest(places: Array, wanted: Array, weight: Array) -> Shade:
+    """Least squares for the direction first, then for the stops."""
     root = np.sqrt(weight)[:, None]
     middle = np.average(places, axis=0, weights=weight)
     flat = np.concatenate([places - middle, np.ones((len(places), 1))], axis=1)
@@ -51,10 +76,17 @@ def _gradient(places: Array, wanted: Array, weight: Array, document: Document) -
     values, *_ = np.linalg.lstsq(
         stacked, np.concatenate([wanted * root, ridge @ np.tile(mean, (STOPS, 1))]), rcond=None
     )
+    off = np.average(np.square(hats @ values - wanted).mean(axis=1), weights=weight)
+    return Shade(middle + np.outer(knots, direction), values, float(np.sqrt(off)))
+
+
+def _gradient(shade: Shade, document: Document) -> str:
+    """The gradient's id."""
+    canvas = document.canvas
     stops = [
         tag("stop", offset=number(i / (STOPS - 1), 3), stop_color=document.color(value))
-        for i, value in enumerate(values.tolist())
+        for i, value in enumerate(shade.colors.tolist())
     ]
-    (x1, y1), (x2, y2) = canvas.places(middle + np.outer(knots[[0, -1]], direction)).tolist()
+    (x1, y1), (x2, y2) = canvas.places(shade.places[[0, -1]]).tolist()
     ends = {name: canvas.number(v) for name, v in (("x1", x1), ("y1", y1), ("x2", x2), ("y2", y2))}
     return document.define("shade", "linearGradient", *stops, gradientUnits="userSpaceOnUse", **ends)
