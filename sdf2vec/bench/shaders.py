@@ -26,7 +26,7 @@ from ..files import write_atomically
 from ..roundtrip import SHADERTOY_HEAD, SHADERTOY_TAIL
 from ..scene import Scene
 
-COUNTS = (16, 64, 256, 1024, 4096)
+COUNTS = (16, 64, 256, 768, 1024, 4096)  # 768: nearly the most that a constant table takes
 SIDE = 512  # pixels of the square canvas
 SECONDS = 60  # after which a combination is given up
 FRAMES = 2

@@ -89,7 +89,7 @@ class Fit:
         self.tensors = self._start()
         self._announce_compiling()
         self.tensors = on_device(self.tensors, self.device.name)
-        self.optimizer = adam(self.tensors)
+        self.optimizer = self._adam()
 
     @property
     def phases(self) -> tuple[Phase, ...]:
@@ -117,10 +117,13 @@ class Fit:
                 if phase.batches == 1:
                     self._train(stage)
                 else:
-                    self.optimizer = adam(self.tensors)
+                    self.optimizer = self._adam()
                     self._train(stage, partial(_in_batch, batch, phase.batches))
         for _ in range(self.settings.trials):
             self._try(stage)
+
+    def _adam(self, frozen: tuple[str, ...] = ()) -> Adam:
+        return adam(self.tensors, self.preset.crowding, frozen)
 
     def _count_steps(self) -> int:
         steps = sum(phase.total for phase in self.phases) + self.settings.trials * TRIAL_STEPS
@@ -222,7 +225,7 @@ class Fit:
         exchange(self.tensors, self.optimizer, least(scores, count), places.groups)
         first = self.tensors.layer_count - count
         phase = Phase("trial", TRIAL_STEPS, stage.phase.resolution, rate=TRIAL_RATE, end_rate=0.05)
-        self.optimizer = adam(self.tensors)
+        self.optimizer = self._adam()
         try:
             self._train(replace(stage, phase=phase), lambda group: group.order >= first)
         finally:  # also when stopped
@@ -230,7 +233,7 @@ class Fit:
                 worse = float(stage.measure(self._draw(self.tensors, stage.target))) >= loss
             if worse:
                 self.tensors.groups = before
-            self.optimizer = adam(self.tensors)
+            self.optimizer = self._adam()
 
     def _restrict_colors(self, stage: Stage) -> None:
         """To the palette given or, of so many colours, the best."""
@@ -242,7 +245,7 @@ class Fit:
 
     def _refit(self, stage: Stage) -> None:
         """Trains all but the colours."""
-        self.optimizer = adam(self.tensors, frozen=("color", "background"))
+        self.optimizer = self._adam(frozen=("color", "background"))
         phase = Phase("palette", REFIT_STEPS, stage.phase.resolution, rate=0.4, end_rate=0.02)
         self._train(replace(stage, phase=phase))
 
@@ -302,21 +305,22 @@ def _freeze(tensors: SceneTensors, moves: Callable[[Group], torch.Tensor]) -> No
         tensors.background.grad.zero_()
 
 
-def adam(tensors: SceneTensors, frozen: tuple[str, ...] = ()) -> Adam:
+def adam(tensors: SceneTensors, crowding: float = CROWDING, frozen: tuple[str, ...] = ()) -> Adam:
     """Adam over all that may move, each tensor at the rate of what it means; `frozen`: names in `RATES`."""
     free = [pair for group in tensors.groups for pair in group.tensors()]
     if not tensors.transparent:
         free.append(("background", tensors.background))
         if tensors.compositing == "additive":
             frozen = (*frozen, "opacity")
-    rates = _rates_for(tensors)
+    rates = _rates_for(tensors, crowding)
     return Adam((tensor, rates[name]) for name, tensor in free if name not in frozen)
 
 
-def _rates_for(tensors: SceneTensors) -> dict[str, float]:
+def _rates_for(tensors: SceneTensors, crowding: float) -> dict[str, float]:
     """`RATES` for a canvas of this size with so many layers."""
     canvas = math.sqrt(tensors.size[0] * tensors.size[1])
-    crowd = (MANY / max(1, tensors.layer_count)) ** CROWDING
+    few = MANY / max(1, tensors.layer_count)
+    crowd = few ** (crowding if few < 1 else CROWDING)
     rates = RATES | {name: RATES[name] * crowd for name in CROWDED}
     rates |= {name: rates[name] * canvas for name in LENGTHS}
     return rates | {"frequency": rates["frequency"] / canvas}

@@ -9,6 +9,7 @@ from typing import Literal
 Loss = tuple[tuple[str, float], ...]  # name in `losses.LOSSES`, weight
 
 MANY = 256  # shapes beyond which the phases' resolution grows
+CROWDING = 0.35  # rates of layers fall with this power of their number
 
 L1: Loss = (("l1", 1.0),)
 MSE: Loss = (("mse", 1.0),)
@@ -70,7 +71,7 @@ class Start:
 class Preset:
     """A whole fit. `compositing`: the only one that it is for; `falloff`: its range in scene units;
     `least_area`: of a shape, in shares of the canvas; smaller ones are pushed to grow; `sharpens`: whether the
-    phases' resolution grows with the number of shapes.
+    phases' resolution grows with the number of shapes; `crowding`: the power by which rates fall beyond `MANY` layers.
     """
 
     phases: tuple[Phase, ...]
@@ -79,6 +80,7 @@ class Preset:
     falloff: tuple[float, float] = (0.0, 1.5)
     least_area: float = 0.0
     sharpens: bool = True
+    crowding: float = CROWDING
 
     def resolution(self, phase: Phase, shapes: int) -> float:
         """A phase's resolution for so many shapes: what is drawn with many needs more pixels to tell them apart."""
@@ -127,6 +129,7 @@ PRESETS: dict[str, Preset] = {
         compositing="additive",
         falloff=(0.01, 0.99),
         sharpens=False,
+        crowding=1.5,  # its layers are large and all lie on each other; with more of them, SSIM runs away
         least_area=3e-4,
     ),
 }
@@ -146,4 +149,3 @@ RATES = {
 }
 LENGTHS = ("position", "length", "falloff", "smoothness")  # grow with the canvas
 CROWDED = (*LENGTHS, "color", "opacity")  # fall with the number of layers: smaller ones take smaller steps
-CROWDING = 0.35  # by this power of it
