@@ -63,10 +63,11 @@ def render(scene: Scene, width: int | None = None, height: int | None = None) ->
 
 
 def export(scene: Scene, target: str, **options: Any) -> str | bytes:
-    """The scene as "glsl", "shadertoy", "wgsl", "svg", "data-uri", "json" (text), "png" or "pdf" (bytes).
+    """The scene as text ("glsl", "shadertoy", "wgsl", "three", "godot", "svg", "data-uri", "html", "component",
+    "json") or as bytes ("png", "pdf").
 
-    Options: `size`, `glsl`, `layout`, `title`, `svg_profile`, `svg_size_limit`, as in
-    `sdf2vec.export.options.Options`. Raises Sdf2vecError.
+    Options: those of `sdf2vec.export.options.Options`, for example `size`, `layout`, `title`, `svg_profile`. Raises
+    Sdf2vecError.
     """
     return _export(scene, target, Options(**options))
 
