@@ -309,7 +309,6 @@ def test_same_seed_same_bytes(folder, run):
         (["photo.jpg", "--size", "0", "--emit", "png"], ["size", "got 0"]),
         (["photo.jpg", "--size", "1e3", "--emit", "png"], ["--size"]),
         (["photo.jpg", "--no-such-option"], ["--no-such-option"]),
-        (["photo.jpg", "--emit", "glsl,pdf", "--compositing", "additive"], ["svg", "blend modes"]),
         (["missing.png"], ["missing.png", "no such file"]),
         (["two\nlines.png"], ["no such file"]),
         (["."], ["folder"]),
