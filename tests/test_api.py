@@ -1,6 +1,5 @@
 """The public functions, in the words of the command line."""
 
-import inspect
 import io
 import subprocess
 import sys
@@ -16,7 +15,7 @@ import sdf2vec
 from sdf2vec import Layer, Scene, Sdf2vecError, Shape, api
 from sdf2vec.export import EXPORTERS
 from sdf2vec.fit.presets import PRESETS
-from sdf2vec.fit.settings import LOSS_NAMES, kinds_of, losses_of
+from sdf2vec.fit.settings import LOSS_NAMES, kinds_of, losses_of, settings_of
 from sdf2vec.image import load
 
 if TYPE_CHECKING:
@@ -80,7 +79,7 @@ def test_settings_matter_and_defaults_are_said(levels):
     assert {layer.kind for layer in fit(levels, 40, kind="mixed").layers} == set(sdf2vec.KINDS)
     assert fit(levels, compositing="additive").compositing == "additive"
     assert fit(levels, loss="mse") != fit(levels, loss="l1")
-    assert inspect.signature(sdf2vec.fit).parameters["shapes"].default == 256
+    assert settings_of().shapes == 256
 
 
 def test_names_of_kinds():
