@@ -158,7 +158,8 @@ def page(scenes: dict[int, Scene], name: str, command: str) -> str:
         "llvmpipe and lavapipe compile anew for every picture: compile is a picture of one pixel, frame what a "
         "whole one takes beyond that. Chromium (SwiftShader) compiles most of a shader in its first frame. Depth: "
         "layers that a pixel evaluates, on average; bytes: text and data; error: largest difference from the torch "
-        "render, in 8-bit levels.",
+        "render, in 8-bit levels, over the whole square canvas. Packed text is made for a canvas of 16:9: below and "
+        "above the picture, which that does not show, it may be off by more.",
         "",
         f"    {command}",
         "",

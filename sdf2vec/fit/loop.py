@@ -123,7 +123,8 @@ class Fit:
             self._try(stage)
 
     def _adam(self, frozen: tuple[str, ...] = ()) -> Adam:
-        return adam(self.tensors, self.preset.crowding, frozen)
+        losses = {name for phase in self.phases for name, _ in phase.loss}
+        return adam(self.tensors, self.preset.crowding if "ssim" in losses else CROWDING, frozen)
 
     def _count_steps(self) -> int:
         steps = sum(phase.total for phase in self.phases) + self.settings.trials * TRIAL_STEPS

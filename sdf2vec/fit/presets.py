@@ -71,7 +71,8 @@ class Start:
 class Preset:
     """A whole fit. `compositing`: the only one that it is for; `falloff`: its range in scene units;
     `least_area`: of a shape, in shares of the canvas; smaller ones are pushed to grow; `sharpens`: whether the
-    phases' resolution grows with the number of shapes; `crowding`: the power by which rates fall beyond `MANY` layers.
+    phases' resolution grows with the number of shapes; `crowding`: the power by which rates fall
+    beyond `MANY` layers when the loss is SSIM, `CROWDING` otherwise.
     """
 
     phases: tuple[Phase, ...]
