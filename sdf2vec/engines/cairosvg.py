@@ -1,15 +1,12 @@
 """SVG drawn by CairoSVG, which ignores filters and blend modes: a judge of the portable profile only."""
 
-import io
 from functools import cache
-
-import numpy as np
-from PIL import Image
 
 from sdf2vec.engines.engine import (
     SVG_NAMESPACE,
     EngineError,
     Picture,
+    pixels_of,
     reason_missing,
     require_present,
     with_viewport,
@@ -39,8 +36,7 @@ def render(svg: str, width: int, height: int) -> Picture:
         png = cairosvg.svg2png(bytestring=sized.encode())
     except Exception as error:  # CairoSVG has no error of its own
         raise EngineError(f"CairoSVG refuses the SVG: {error}") from None
-    with Image.open(io.BytesIO(png)) as picture:
-        return np.asarray(picture.convert("RGBA"), np.float32) / np.float32(255)
+    return pixels_of(png)
 
 
 def _draw_nothing() -> None:

@@ -5,7 +5,6 @@ nothing is served on a port and nothing else can be reached.
 """
 
 import atexit
-import io
 import mimetypes
 import shutil
 import tempfile
@@ -14,12 +13,10 @@ from contextlib import contextmanager
 from functools import cache
 from typing import TYPE_CHECKING, Any
 
-import numpy as np
-from PIL import Image
-
 from sdf2vec.engines.engine import (
     EngineError,
     Picture,
+    pixels_of,
     reason_missing,
     require_drawable,
     require_present,
@@ -115,8 +112,7 @@ def screenshot(page: "Page", selector: str | None = None) -> Picture:
     """
     place = page.locator(selector).first if selector else page
     png = place.screenshot(type="png", omit_background=True, animations="disabled")
-    with Image.open(io.BytesIO(png)) as picture:
-        return np.asarray(picture.convert("RGBA"), np.float32) / np.float32(255)
+    return pixels_of(png)
 
 
 def _answer(route: "Route", files: Mapping[str, str | bytes]) -> None:

@@ -1,5 +1,6 @@
 """What the engines have in common: their record, their error and their checks."""
 
+import io
 from collections.abc import Callable, Mapping
 from contextlib import suppress
 from dataclasses import dataclass
@@ -7,6 +8,7 @@ from xml.etree import ElementTree
 
 import numpy as np
 from numpy.typing import NDArray
+from PIL import Image
 
 from sdf2vec.errors import Sdf2vecError
 
@@ -71,6 +73,12 @@ def require_drawable(width: int, height: int) -> None:
             f"cannot draw {width} × {height} pixels: "
             f"a side has 1 to {LARGEST_SIDE}, the picture at most {LARGEST_AREA}"
         )
+
+
+def pixels_of(png: bytes) -> Picture:
+    """A PNG as float32 `[height, width, 4]` in 0..1 with straight alpha, row 0 at the top."""
+    with Image.open(io.BytesIO(png)) as picture:
+        return np.asarray(picture.convert("RGBA"), np.float32) / np.float32(255)
 
 
 def with_viewport(svg: str, width: int, height: int) -> str:

@@ -3,7 +3,6 @@
 A screenshot is opaque, so the picture is shown twice, on white and on black, which together tell its alpha.
 """
 
-import io
 import shutil
 import subprocess
 import tempfile
@@ -11,9 +10,8 @@ from functools import cache
 from pathlib import Path
 
 import numpy as np
-from PIL import Image
 
-from sdf2vec.engines.engine import EngineError, Picture, require_present, with_viewport
+from sdf2vec.engines.engine import EngineError, Picture, pixels_of, require_present, with_viewport
 
 PROGRAMS = ("firefox-esr", "firefox")
 SECONDS = 120.0
@@ -83,8 +81,7 @@ def _screenshot(folder: Path, width: int, height: int) -> Picture:
         raise EngineError(f"Firefox took no picture in {SECONDS:g} seconds") from None
     if not output.exists():
         raise EngineError("Firefox took no picture", log=done.stderr.decode(errors="replace"))
-    with Image.open(io.BytesIO(output.read_bytes())) as picture:
-        pixels = np.asarray(picture.convert("RGB"), np.float32)[:height, :width] / np.float32(255)
+    pixels = pixels_of(output.read_bytes())[:height, :width, :3]
     if pixels.shape != (height, width, 3):
         raise EngineError(
             f"Firefox drew {pixels.shape[1]} × {pixels.shape[0]} pixels, not {width} × {height}"

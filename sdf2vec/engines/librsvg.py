@@ -1,14 +1,10 @@
 """SVG drawn by librsvg's command."""
 
-import io
 import shutil
 import subprocess
 from functools import cache
 
-import numpy as np
-from PIL import Image
-
-from sdf2vec.engines.engine import EngineError, Picture, require_present, with_viewport
+from sdf2vec.engines.engine import EngineError, Picture, pixels_of, require_present, with_viewport
 
 PROGRAM = "rsvg-convert"
 
@@ -34,5 +30,4 @@ def render(svg: str, width: int, height: int) -> Picture:
     if done.returncode != 0:
         log = done.stderr.decode(errors="replace")
         raise EngineError(f"librsvg refuses the SVG: {log}", log=log)
-    with Image.open(io.BytesIO(done.stdout)) as picture:
-        return np.asarray(picture.convert("RGBA"), np.float32) / np.float32(255)
+    return pixels_of(done.stdout)

@@ -1,15 +1,12 @@
 """SVG drawn by resvg."""
 
-import io
 from functools import cache
-
-import numpy as np
-from PIL import Image
 
 from sdf2vec.engines.engine import (
     SVG_NAMESPACE,
     EngineError,
     Picture,
+    pixels_of,
     reason_missing,
     require_present,
     with_viewport,
@@ -42,8 +39,7 @@ def render(svg: str, width: int, height: int) -> Picture:
         png = resvg_py.svg_to_bytes(svg_string=sized, skip_system_fonts=True)
     except ValueError as error:
         raise EngineError(f"resvg refuses the SVG: {error}", log=str(error)) from None
-    with Image.open(io.BytesIO(png)) as picture:
-        return np.asarray(picture.convert("RGBA"), np.float32) / np.float32(255)
+    return pixels_of(png)
 
 
 def _draw_nothing() -> None:
