@@ -267,16 +267,11 @@ class _View:
 
     def coverages(self, scene: Scene, chosen: NDArray[np.int64]) -> Floats:
         """Coverage of every layer at some of the pixels, [L, B]."""
-        import torch
-
         from ..render import reference
         from ..render.tensors import from_scene
 
-        found = np.zeros((len(scene.layers), len(chosen)), np.float32)
-        with torch.no_grad():
-            for group in from_scene(scene).groups:
-                cover, _ = reference.group_coverage(group, self.x[chosen], self.y[chosen], self.pixel)
-                found[group.order.numpy()] = cover.numpy()
+        covers, _ = reference.layers_at(from_scene(scene), self.x[chosen], self.y[chosen], self.pixel)
+        found: Floats = covers.numpy()
         return found
 
 

@@ -6,12 +6,11 @@ from dataclasses import replace
 from functools import lru_cache
 
 import numpy as np
-import torch
 
 from ..image import Picture, fitted_size, unpremultiply
 from ..metrics import psnr
 from ..render.draw import draw
-from ..render.reference import canvas, group_coverage
+from ..render.reference import canvas, layers_at
 from ..render.tensors import from_scene
 from ..scene import Layer, Scene, Shape
 from .loop import fit_picture
@@ -25,16 +24,15 @@ OPACITY = 0.9
 @lru_cache(maxsize=4)
 def over_of(scene: Scene) -> tuple[Scene, float]:
     """A scene under `over` with as many shapes that looks like an additive one, and how near it is in dB."""
+    if not scene.layers:
+        return replace(scene, background=_displayed(scene.background), compositing="over"), float("inf")
     width, height = fitted_size(scene.width, scene.height, min(LARGEST, scene.width, scene.height))
     wanted = draw(scene, width, height)
     channels = 4 if scene.background is None else 3
-    start = _painted(scene)
-    if not scene.layers:
-        return start, float("inf")
     pixels = wanted.permute(1, 2, 0).numpy()
     picture = Picture(unpremultiply(pixels) if channels == 4 else np.ascontiguousarray(pixels[..., :3]))
     kinds = list(dict.fromkeys(layer.kind for layer in scene.layers))
-    fitted = fit_picture(picture, settings_of(kind=kinds, start=start, device="cpu"))
+    fitted = fit_picture(picture, settings_of(kind=kinds, start=_painted(scene), device="cpu"))
     found = replace(fitted, width=scene.width, height=scene.height)
     return found, float(psnr(draw(found, width, height)[:channels], wanted[:channels]))
 
@@ -45,16 +43,12 @@ def _painted(scene: Scene) -> Scene:
     tensors = from_scene(scene)
     image = draw(scene, width, height).flatten(1)
     x, y, pixel = canvas(tensors, width, height)
-    areas, colors = np.zeros(len(scene.layers)), np.zeros((len(scene.layers), 3))
-    with torch.no_grad():
-        for group in tensors.groups:
-            cover, _ = group_coverage(group, x, y, pixel)
-            own = cover.reshape(len(group.order), -1).float()
-            light = own @ image[:3].T / (own @ image[3])[:, None].clamp_min(1e-6)
-            rows = group.order.numpy()
-            areas[rows], colors[rows] = own.sum(1).numpy(), light.clamp(0.0, 1.0).numpy()
-    layers = [_laid(scene.layers[i], colors[i].tolist()) for i in np.argsort(-areas, kind="stable")]
-    return Scene(scene.width, scene.height, tuple(layers), _displayed(scene.background))
+    covers, _ = layers_at(tensors, x, y, pixel)
+    light = covers @ image[:3].T / (covers @ image[3])[:, None].clamp_min(1e-6)
+    colors = light.clamp(0.0, 1.0).tolist()
+    order = (-covers.sum(1)).argsort(stable=True).tolist()
+    layers = tuple(_laid(scene.layers[i], colors[i]) for i in order)
+    return Scene(scene.width, scene.height, layers, _displayed(scene.background))
 
 
 def _laid(layer: Layer, color: list[float]) -> Layer:

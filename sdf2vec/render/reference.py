@@ -124,6 +124,17 @@ def group_coverage(
     return cover, torch.stack(color, dim=1)
 
 
+@torch.no_grad()
+def layers_at(
+    tensors: SceneTensors, x: torch.Tensor, y: torch.Tensor, pixel: torch.Tensor
+) -> tuple[torch.Tensor, torch.Tensor]:
+    """Coverage [L, P] and colour [L, 3, P or 1] of a scene's layers, in draw order, at points x [P], y [P]."""
+    order = torch.cat([group.order for group in tensors.groups]).argsort()
+    covers, colors = zip(*(group_coverage(group, x, y, pixel) for group in tensors.groups), strict=True)
+    widest = max(color.shape[2] for color in colors)
+    return torch.cat(covers)[order], torch.cat([color.expand(-1, -1, widest) for color in colors])[order]
+
+
 # --- lowered formulas --------------------------------------------------------------------------------------
 
 

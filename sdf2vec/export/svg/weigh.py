@@ -42,9 +42,7 @@ def contrasts(scene: Scene) -> Array:
 
 def layers_at(scene: Scene, side: int) -> tuple[Array, Array]:
     """Coverage [N, P] and colour [N, 3, P or 1] of all layers on a small canvas of the scene's shape."""
-    import torch
-
-    from ...render.reference import canvas, group_coverage
+    from ...render import reference
     from ...render.tensors import from_scene
 
     shortest = min(scene.width, scene.height)
@@ -52,13 +50,6 @@ def layers_at(scene: Scene, side: int) -> tuple[Array, Array]:
     scale = min(side, max(8, int(most)), shortest) / shortest
     width, height = max(1, round(scene.width * scale)), max(1, round(scene.height * scale))
     tensors = from_scene(scene)
-    x, y, pixel = canvas(tensors, width, height)
-    covers = np.zeros((len(scene.layers), width * height))
-    varied = any(len(layer.shapes) > 1 for layer in scene.layers)
-    colors = np.zeros((len(scene.layers), 3, width * height if varied else 1))
-    with torch.no_grad():
-        for group in tensors.groups:
-            cover, color = group_coverage(group, x, y, pixel * scale)
-            covers[group.order.numpy()] = cover.numpy()
-            colors[group.order.numpy()] = color.numpy()
-    return covers, colors
+    x, y, pixel = reference.canvas(tensors, width, height)
+    covers, colors = reference.layers_at(tensors, x, y, pixel * scale)
+    return covers.double().numpy(), colors.double().numpy()
