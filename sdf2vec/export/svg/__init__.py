@@ -16,29 +16,27 @@ from ...files import one_line
 from ...scene import Scene
 from ..options import Options
 from .canvas import Canvas, Document, color_text, tag
+from .compensate import compensated
 from .field import extent
 from .layers import Detail, Painter, Part, plan
-from .lean import GROUP
+from .lean import COARSE, FINE, GROUP
 from .sums import Term, alternating, terms
 
 PORTABLE = "portable"
-LIFTS = {
-    "filters": 0.35,
-    PORTABLE: 0.2,
-}  # levels; what renderers lose, from none (resvg) to twice that (browsers)
 CREATED = re.compile(rb"(/CreationDate \(D:)([^)]*)")
 DIFFERENCE = "mix-blend-mode:difference"
 
 # From what looks like the render to what is small. Names go last, for they are what a person edits by.
 DETAILS = (
     Detail(),
-    Detail(target=44.0, levels=0.3),
-    Detail(target=41.0, levels=0.5),
-    Detail(target=38.0, levels=0.8, coarser=1),
+    Detail(target=43.0, levels=0.3),
+    Detail(target=40.0, levels=0.5),
+    Detail(target=37.0, levels=0.8, coarser=1),
     Detail(target=34.0, levels=1.2, coarser=1),
     Detail(target=30.0, levels=2.0, coarser=1, named=False),
     Detail(target=0.0, levels=4.0, coarser=1, named=False),
-    Detail(target=0.0, levels=4.0, coarser=1, named=False, lean=True),
+    Detail(target=0.0, levels=4.0, named=False, lean=FINE),
+    Detail(target=0.0, levels=4.0, named=False, lean=COARSE),
 )
 
 
@@ -115,17 +113,23 @@ def _coarser(detail: Detail, limit: int) -> str:
 @lru_cache(maxsize=16)
 def _drawing(scene: Scene, profile: str, detail: Detail) -> Written:
     additive = scene.compositing == "additive"
-    document = Document(Canvas.of(scene, detail.coarser), detail.named, 0.0 if additive else LIFTS[profile])
+    grain = detail.lean
+    canvas = Canvas.whole(scene, grain.units) if grain else Canvas.of(scene, detail.coarser)
+    document = Document(canvas, detail.named)
     if scene.background is not None:
         document.body.append(tag("rect", width="100%", height="100%", fill=color_text(scene.background)))
-    painter = Painter(document, detail, plan(scene, document.canvas, detail, profile != PORTABLE))
+    planned = plan(scene, document.canvas, detail, profile != PORTABLE)
+    if not additive:
+        off = {index: blurred.difference for index, blurred in planned.blurred.items()}
+        scene = compensated(scene, off, *((grain.colors, grain.opacities) if grain else ()))
+    painter = Painter(document, detail, planned)
     if additive:
         found = _add_terms(scene, document, painter)
     else:
         found = ()
         drawn = (painter.draw(Part(layer, index)) for index, layer in enumerate(scene.layers))
         elements = [element for element in drawn if element]
-        document.body += [tag("g", "\n".join(elements), **GROUP)] if detail.lean and elements else elements
+        document.body += [tag("g", "\n".join(elements), **GROUP)] if grain and elements else elements
     return Written(document, found)
 
 

@@ -31,10 +31,10 @@ def seen(layer: Layer, canvas: Canvas) -> Box:
 
 
 def trace_grid(box: Box, falloff: float) -> Grid:
-    """A grid fine enough to trace contours on."""
+    """A grid fine enough to trace contours on; larger by a cell than the box, for contours are closed within one."""
     longest = max(box.right - box.left, box.bottom - box.top)
-    step = min(max(1.0 / TRACE, falloff / SOFTLY), longest / FEWEST)
-    return grid_over(box, max(step, longest / MAX_CELLS))
+    step = max(min(max(1.0 / TRACE, falloff / SOFTLY), longest / FEWEST), longest / MAX_CELLS)
+    return grid_over(box.grown(step), step)
 
 
 def contours(field: Array, level: float, grid: Grid) -> list[Points]:

@@ -1,12 +1,14 @@
 """One blurred element for a soft shape: small, but only near, most of all at corners.
 
 The outline where coverage is one half, blurred by a Gaussian of the falloff's spread. A blur rounds corners off, so
-the outline's own corners are made sharper; how much, and how wide the blur, is found by trying.
+the outline's own corners are made sharper; how much, and how wide the blur, is found by trying. What has no outline
+of its own is traced, and its contour moved until the blurred one lies where coverage is one half.
 """
 
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import lru_cache
 from typing import NamedTuple
@@ -16,49 +18,77 @@ from numpy.typing import NDArray
 
 from ...scene import Layer
 from ...shapes import KINDS, Outline
-from .field import Array, Grid, covers, extent, grid_over
-from .outlines import core, distance_to, sharpened
+from .bands import contours
+from .compensate import Difference
+from .field import Array, Grid, covers, distances, extent, grid_over
+from .outlines import Traced, core, distance_to, sharpened
 
 GAUSSIAN = math.pi / math.sqrt(3.0) / 10.0  # standard deviation of the edge's logistic profile, in falloffs
 SHARES = (1.0, 0.7, 0.45, 0.2)  # of the corner radius that an offset outline has
 WIDTHS = (0.9, 1.0, 1.1)  # of the Gaussian
-LADDER = 1.12  # ratio of neighbouring standard deviations, so that shapes share filters
-CELLS = 44  # of the grid along the longest side
-LEAST = 2.0  # user units: librsvg blurs much too little below it
+# Standard deviations in user units, few so that shapes can share filters. At these the three boxes of the standard
+# (librsvg, browsers on the CPU) and resvg's five are near to a Gaussian (browsers on a GPU), at twice the size as well.
+STEPS = (2.15, 2.45, 3.2, 3.65, 4.3, 4.7, 5.15, 5.75, 6.3, 7.35)
+LADDER = 1.12  # ratio of neighbouring ones beyond the last
+CELLS = 44, 96  # of the grid along the longest side, at least and at most
+TRACED_CELLS = 96, 256  # of a traced shape's
+ACROSS = 1.5  # of them in a standard deviation
+MOVES = 4  # of a traced contour to where its blur is one half
+LEAST = STEPS[0]  # librsvg blurs much too little below 2
 
 
 class Blurred(NamedTuple):
-    """An outline, the standard deviation of its blur in scene units, and what is wrong with it.
+    """An outline, the standard deviation of its blur in scene units (0: none), and what is wrong with it.
 
-    `error` is the integral of the squared difference of coverage, in squared scene units.
+    `error` is the integral of the squared difference of coverage, in squared scene units; `error_cut` the same where
+    a renderer (librsvg) cuts the shape off at the canvas' edge before it blurs.
     """
 
-    outline: Outline
+    outline: Outline | Traced
     deviation: float
     error: float
+    error_cut: float
+    difference: Difference
 
 
 def quantised(deviation: float) -> float:
     """The nearest standard deviation, in user units, that filters are made for."""
-    return LADDER ** round(math.log(deviation, LADDER))
+    if deviation > STEPS[-1]:
+        return STEPS[-1] * LADDER ** round(math.log(deviation / STEPS[-1], LADDER))
+    return min(STEPS, key=lambda step: abs(math.log(step / deviation)))
 
 
 @lru_cache(maxsize=8192)
-def best_blur(layer: Layer, size: tuple[int, int, float]) -> Blurred | None:
-    """The blurred outline nearest to a layer's coverage, if its kind has an outline made of a polygon.
+def best_blur(layer: Layer, size: tuple[float, float, float]) -> Blurred | None:
+    """The blurred outline nearest to a layer's coverage; None where gradients say it exactly, or nothing is seen.
 
     `size`: width, height and scene unit of the canvas, in user units.
     """
     outline_of = KINDS[layer.kind].outline
     if outline_of is None or len(layer.shapes) > 1:
-        return None
+        return _traced(layer, size)
     outline = outline_of(0.5 * layer.falloff, *layer.shapes[0].named().values())
     if core(outline) is None:
         return None
     trial = trial_of(layer, size)
-    rounded = min((trial.blurred(sharpened(outline, share), 1.0) for share in SHARES), key=_error)
-    widths = (trial.blurred(rounded.outline, width) for width in WIDTHS)
-    return min(rounded, *widths, key=_error)
+    shares = [sharpened(outline, share) for share in SHARES]
+    best = min(shares, key=lambda tried: trial.blurred(tried, 1.0).error)
+    return min(trial.plain(outline), *(trial.blurred(best, width) for width in WIDTHS), key=_error)
+
+
+def _traced(layer: Layer, size: tuple[float, float, float]) -> Blurred | None:
+    """The nearest blur of a contour of a layer that has no outline of its own."""
+    trial = trial_of(layer, size, *TRACED_CELLS)
+    field = distances(layer, trial.grid) - 0.5 * layer.falloff
+    down, across = np.gradient(field, trial.grid.step)
+    edge = trial.wanted * (1.0 - trial.wanted) * trial.seen
+    if edge.sum() < 1e-3:
+        return None
+    steep = max(float(np.sum(edge * np.hypot(down, across)) / edge.sum()), 0.1)  # 1 for a true distance
+    tried = (found for width in WIDTHS for found in trial.moved(field / steep, width / steep))
+    return min(
+        *tried, trial.plain(Traced(tuple(contours(field, 0.0, trial.grid))), field / steep), key=_error
+    )
 
 
 def _error(tried: Blurred) -> float:
@@ -76,27 +106,53 @@ class Trial:
     unit: float
 
     def blurred(self, outline: Outline, width: float) -> Blurred:
-        """The error of an outline whose blur is so many times as wide as the falloff asks for.
+        """An outline whose blur is so many times as wide as the falloff asks for."""
+        deviation = self._deviation(width)
+        return self.judged(outline, distance_to(outline, self.grid), deviation)
 
-        The worse of two: some renderers (librsvg) cut the shape off at the canvas' edge before they blur it.
-        """
-        deviation = quantised(max(width * GAUSSIAN * self.falloff * self.unit, LEAST)) / self.unit
-        sharp = np.clip(0.5 - distance_to(outline, self.grid) / self.grid.step, 0.0, 1.0)
-        whole = [sharp] if self.seen.all() else [sharp, sharp * self.seen]
-        errors = [np.sum(np.square(self._smooth(s, deviation) - self.wanted)[self.seen]) for s in whole]
-        return Blurred(outline, deviation, float(max(errors)) * self.grid.step**2)
+    def plain(self, outline: Outline | Traced, distance: Array | None = None) -> Blurred:
+        """An outline without a blur, at these distances [Y, X] from its edge."""
+        return self.judged(outline, distance_to(outline, self.grid) if distance is None else distance, 0.0)
+
+    def moved(self, field: Array, width: float) -> Iterator[Blurred]:
+        """Contours of a field [Y, X] where it is 0, each nearer to where coverage is one half once it is blurred."""
+        deviation = self._deviation(width)
+        for _ in range(MOVES):
+            found = self.judged(Traced(tuple(contours(field, 0.0, self.grid))), field, deviation)
+            yield found
+            field = field + found.difference.off * deviation * math.sqrt(math.tau)
+
+    def _deviation(self, width: float) -> float:
+        return quantised(max(width * GAUSSIAN * self.falloff * self.unit, LEAST)) / self.unit
+
+    def judged(self, outline: Outline | Traced, distance: Array, deviation: float) -> Blurred:
+        """An outline, drawn at these distances [Y, X] from its edge, and its errors."""
+        sharp = np.clip(0.5 - distance / self.grid.step, 0.0, 1.0)
+        off = self._smooth(sharp, deviation) - self.wanted
+        cut = off if self.seen.all() else self._smooth(sharp * self.seen, deviation) - self.wanted
+        error, error_cut = (float(np.sum(np.square(o)[self.seen])) * self.grid.step**2 for o in (off, cut))
+        return Blurred(outline, deviation, error, error_cut, Difference(self.grid, off))
 
     def _smooth(self, sharp: Array, deviation: float) -> Array:
         from scipy.ndimage import gaussian_filter
 
+        if not deviation:
+            return sharp
         return np.asarray(gaussian_filter(sharp, deviation / self.grid.step, mode="constant", truncate=3.5))
 
 
-def trial_of(layer: Layer, size: tuple[int, int, float]) -> Trial:
-    """What blurs of a layer are compared with; `size` as in `best_blur`."""
+def trial_of(
+    layer: Layer, size: tuple[float, float, float], fewest: int = CELLS[0], most: int = CELLS[1]
+) -> Trial:
+    """What blurs of a layer are compared with, on a grid with so many cells along its longest side.
+
+    `size` as in `best_blur`.
+    """
     width, height, unit = size
     box = extent(layer)
-    grid = grid_over(box, max(box.right - box.left, box.bottom - box.top) / CELLS)
+    longest = max(box.right - box.left, box.bottom - box.top)
+    fine = max(GAUSSIAN * layer.falloff, 0.5 / unit) / ACROSS
+    grid = grid_over(box, longest / min(max(longest / fine, fewest), most))
     across, down = np.abs(grid.x) < width / unit / 2, np.abs(grid.y) < height / unit / 2
     seen = down[:, None] & across[None, :]
     return Trial(layer.falloff, grid, covers(layer, grid, 1.0 / unit), seen, unit)

@@ -20,28 +20,39 @@ OWN_ID = "@own@"  # stands for a definition's id until it has one
 
 @dataclass(frozen=True)
 class Canvas:
-    """A canvas of `width` × `height` user units, `unit` of them in a scene unit.
+    """A canvas of `width` × `height` user units, `unit` of them in a scene unit, `pixels` of the fitted picture in one.
 
     Coordinates get `digits` decimals: a twentieth of a pixel for a picture of 512, more for a smaller one,
     because a drawing is shown at any size.
     """
 
-    width: int
-    height: int
+    width: float
+    height: float
     unit: float
     digits: int
+    pixels: float = 1.0
 
     @classmethod
     def of(cls, scene: Scene, coarser: int = 0) -> Canvas:
-        """The canvas of a scene, with some decimals fewer than usual."""
+        """The canvas of a scene in pixels, with some decimals fewer than usual."""
         unit = float(min(scene.width, scene.height))
         digits = max(0, math.ceil(3.4 - math.log10(unit)), 1) - coarser
         return cls(scene.width, scene.height, unit, max(0, digits))
+
+    @classmethod
+    def whole(cls, scene: Scene, units: int) -> Canvas:
+        """The canvas of a scene whose coordinates are whole numbers, so many units along the shortest side."""
+        pixels = min(scene.width, scene.height) / units
+        return cls(scene.width / pixels, scene.height / pixels, float(units), 0, pixels)
 
     def places(self, points: object) -> Points:
         """Scene points [N, 2] in user units, unrounded."""
         middle = np.array([self.width, self.height]) / 2
         return np.asarray(points, np.float64).reshape(-1, 2) * self.unit + middle
+
+    def from_places(self, places: Points) -> Points:
+        """Points in user units [N, 2] in scene units."""
+        return (places - np.array([self.width, self.height]) / 2) / self.unit
 
     def number(self, value: float) -> str:
         """A coordinate or a length in user units."""
@@ -94,14 +105,10 @@ def tag(name: str, *children: str, **attributes: str | None) -> str:
 
 @dataclass
 class Document:
-    """The growing drawing: definitions, each written once however often it is used, and the body.
-
-    `lift`: levels of 8 bits that layers' colours are raised by on average, against what renderers round down.
-    """
+    """The growing drawing: definitions, each written once however often it is used, and the body."""
 
     canvas: Canvas
     named: bool = True
-    lift: float = 0.0
     definitions: dict[str, str] = field(default_factory=dict)
     styles: dict[str, str] = field(default_factory=dict)
     body: list[str] = field(default_factory=list)
@@ -117,10 +124,6 @@ class Document:
         """Adds a class with some rules and returns its name; the same one as before for equal rules."""
         return self.styles.setdefault(rules, f"{ID_MARK}{_letters(len(self.styles))}")
 
-    def color(self, color: Sequence[float]) -> str:
-        """A layer's colour as it is written."""
-        return color_text(color, self.lift)
-
     def id_of(self, kind: str, index: int) -> str | None:
         """The readable id of a shape's element."""
         return f"{ID_MARK}{kind}-{index + 1}" if self.named else None
@@ -133,8 +136,18 @@ class Document:
             rules = "".join(f".{name}{{{rules}}}" for rules, name in self.styles.items())
             lines.append(f"<style>{rules}</style>")
         inner = "\n".join([*lines, *self.body])
-        size = f'width="{self.canvas.width}" height="{self.canvas.height}"'
-        head = f'<svg xmlns="http://www.w3.org/2000/svg" {size} viewBox="0 0 {self.canvas.width} {self.canvas.height}"'
+        canvas = self.canvas
+        width, height, shown_width, shown_height = (
+            number(side, 4)
+            for side in (
+                canvas.width,
+                canvas.height,
+                canvas.width * canvas.pixels,
+                canvas.height * canvas.pixels,
+            )
+        )
+        size = f'width="{shown_width}" height="{shown_height}" viewBox="0 0 {width} {height}"'
+        head = f'<svg xmlns="http://www.w3.org/2000/svg" {size}'
         prefix = "s" + hashlib.sha256((head + inner).encode()).hexdigest()[:5]
         inner = inner.replace(ID_MARK, prefix)
         return f'{head} role="img">\n<title>{escape(title)}</title>\n{inner}\n</svg>\n'

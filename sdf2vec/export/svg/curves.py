@@ -8,12 +8,32 @@ import numpy as np
 
 from .canvas import Canvas, Points
 
+ASIDE = (
+    0.0137  # user units: no corner is the middle of a pixel, where renderers differ about whose that pixel is
+)
 ROUNDS = 3  # of fitting a curve and moving its parameters to the nearest places
 
 
 def path_data(contours: list[Points], tolerance: float, canvas: Canvas) -> str:
     """Path data of closed contours [M, 2] in user units, at most about `tolerance` away from them."""
     return "".join(_closed(contour, tolerance, canvas) for contour in contours)
+
+
+def polygon_data(contours: list[Points], tolerance: float, canvas: Canvas) -> str:
+    """The same with straight lines: unlike curves', their pixels are the same in every path they are part of."""
+    from skimage.measure import approximate_polygon
+
+    return "".join(
+        relative_polygon(approximate_polygon(contour, tolerance)[:-1], canvas, ASIDE) for contour in contours
+    )
+
+
+def relative_polygon(points: Points, canvas: Canvas, aside: float = 0.0) -> str:
+    """Path data of a closed polygon by how far each corner is from the last, all corners `aside` of round numbers."""
+    rounded = canvas.rounded(points - aside)
+    start = " ".join(canvas.fine(v) for v in (rounded[0] + aside).tolist())
+    rest = " ".join(canvas.number(v) for v in np.diff(rounded, axis=0).ravel().tolist())
+    return f"M{start}l{rest}z".replace(" -", "-")
 
 
 def _closed(contour: Points, tolerance: float, canvas: Canvas) -> str:

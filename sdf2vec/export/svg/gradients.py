@@ -4,8 +4,9 @@ A slice beyond a side is painted by a linear gradient across it, one beyond a co
 it: just how the distance grows. Slices meet at shared points and are drawn without antialiasing, so that every
 pixel belongs to exactly one of them: no seams, and no need for masks where they are translucent.
 
-Opacity is given to the group: as the paint's, resvg would round half a level up at every layer. Each gradient has
-stops of its own: CairoSVG takes quadratic time to follow references from one gradient to another.
+Opacity is given to each slice: as a group's, browsers would round half a level down at every layer, as the paint's,
+resvg half a level up. Each gradient has stops of its own: CairoSVG takes quadratic time to follow references from one
+gradient to another.
 """
 
 from __future__ import annotations
@@ -18,10 +19,11 @@ import numpy as np
 from ...blend import REACH
 from ...scene import Color
 from ...shapes import EllipseOutline
-from .canvas import Canvas, Document, Points, number, opacity_text, tag, url
+from .canvas import Canvas, Document, Points, color_text, number, opacity_text, tag, url
 from .outlines import convex, sides, turn
 from .stops import SOFT, edge_stops, stop_elements
 
+LIFT = -0.25  # 8-bit levels: resvg and Firefox gain half a level at a gradient, the others nothing
 WIDEST = math.radians(60.0)  # of a circular sector drawn as a triangle
 
 
@@ -44,7 +46,7 @@ def ellipse(outline: EllipseOutline, paint: Paint, document: Document, name: str
     rx, ry = (radius * canvas.unit * grown for radius in outline.radii)
     start = max(-shortest, 0.5 - REACH)
     offsets = [((1.0 + d / shortest) / grown, c) for d, c in edge_stops(start, paint.stops)]
-    stops = stop_elements(offsets, document.color(paint.color))
+    stops = stop_elements(offsets, color_text(paint.color, LIFT))
     look = {"opacity": opacity_text(paint.opacity)}
     place = {"cx": canvas.number(x), "cy": canvas.number(y)}
     if canvas.number(rx) == canvas.number(ry):
@@ -65,22 +67,24 @@ def sliced(points: Points, rounding: float, paint: Paint, document: Document, na
     corners = canvas.rounded(convex(points))
     corners = convex(corners)
     reach = rounding + SOFT * paint.falloff
-    stops = stop_elements(_offsets(rounding, reach, paint), document.color(paint.color))
+    stops = stop_elements(_offsets(rounding, reach, paint), color_text(paint.color, LIFT))
+    opacity = opacity_text(paint.opacity)
     parts = []
     outer = [canvas.rounded(np.stack([a, b]) + normal * reach) for a, b, normal in sides(corners)]
     for index, (a, b, normal) in enumerate(sides(corners)):
         inner = np.roll(corners, -index - 1, axis=0) if index == 0 else np.stack([b, a])
         slope = _linear(a, b, normal * reach, stops, document)
-        parts.append(_slice(np.concatenate([outer[index], inner]), slope, canvas))
+        parts.append(_slice(np.concatenate([outer[index], inner]), slope, opacity, canvas))
     radial = [_radial(corner, reach, stops, document) for corner in corners]
     for index, corner in enumerate(corners):
         if len(corners) > 1:
             start, end = outer[index - 1][1], outer[index][0]
         else:
             start = end = corner + np.array([reach, 0.0])
-        parts += [_slice(p, radial[index], canvas) for p in _sectors(corner, start, end, reach, canvas)]
-    look = {"opacity": opacity_text(paint.opacity)}
-    return tag("g", *parts, id=name, shape_rendering="crispEdges", **look)
+        parts += [
+            _slice(p, radial[index], opacity, canvas) for p in _sectors(corner, start, end, reach, canvas)
+        ]
+    return tag("g", *parts, id=name, shape_rendering="crispEdges")
 
 
 def _offsets(rounding: float, reach: float, paint: Paint) -> list[tuple[float, float]]:
@@ -90,8 +94,8 @@ def _offsets(rounding: float, reach: float, paint: Paint) -> list[tuple[float, f
     return [((d * paint.falloff + rounding) / reach, c) for d, c in pairs]
 
 
-def _slice(points: Points, gradient: str, canvas: Canvas) -> str:
-    return tag("path", d=canvas.polygon_path(points), fill=url(gradient))
+def _slice(points: Points, gradient: str, opacity: str | None, canvas: Canvas) -> str:
+    return tag("path", d=canvas.polygon_path(points), fill=url(gradient), opacity=opacity)
 
 
 def _linear(a: Points, b: Points, across: Points, stops: list[str], document: Document) -> str:

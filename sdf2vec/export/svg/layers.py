@@ -11,23 +11,29 @@ from ...scene import Layer, Scene
 from ...shapes import KINDS, EllipseOutline, Outline
 from .bands import band_count, band_levels, layer_contours
 from .blur import Blurred, best_blur
-from .canvas import Canvas, Document, Points, opacity_text, tag, url
-from .curves import path_data
+from .canvas import Canvas, Document, Points, color_text, opacity_text, tag, url
+from .curves import path_data, polygon_data
 from .field import Array, extent
 from .gradients import Paint, ellipse, sliced
-from .lean import lean
-from .outlines import core, element
+from .lean import Grain, lean, lean_blur, softnesses
+from .outlines import TOLERANCE, core, element, upright
 from .pieces import piece_contours
 from .shading import fill_of, is_mixed
 from .stops import stop_count
 from .weigh import contrasts
 
-SHARP = 2.0  # user units: an edge softer than this is drawn soft
-SMALL = 64.0  # user units along the shortest side: a picture smaller than this will be shown larger
+SHARP = 2.0  # pixels: an edge softer than this is drawn soft
+SMALL = 64.0  # pixels along the shortest side: a picture smaller than this will be shown larger
+CUT = 4.0  # times as bad as others is the error of what the canvas' edge cuts off: there all layers err alike
+TRANSPARENT_LIFT = 0.5  # 8-bit levels: on no ground browsers lose half of one at a blur
 BANDS_COARSER = 4.0  # bands are dear, and their steps alternate in sign
 PIECES_COARSER = 8.0  # pieces are still dearer: every shape of a union has bands of its own
+NARROW = 12.0  # pixels: bands of a softer edge need no antialiasing
+LOOSEST = 1.0  # user units that a contour of a soft edge may be off
 MIXED = 7.5  # by so much more than the stops of an edge may a gradient through a union be off
-TOLERANCE = 0.05  # user units that a traced contour may be off
+
+
+Bands = list[tuple[float, list[Points]]]  # coverage and contours, outermost first
 
 
 @dataclass(frozen=True)
@@ -36,14 +42,14 @@ class Detail:
 
     `levels`: the error, in 8-bit levels, that the stops of one shape's edge may leave, and times
     BANDS_COARSER the bands of a traced one. `coarser`: decimals fewer. `named`: ids on shapes.
-    `lean`: nothing but blurs, in the smallest text.
+    `lean`: nothing but blurs, in the smallest text, so coarse.
     """
 
-    target: float = 46.0
+    target: float = 45.0
     levels: float = 0.2
     coarser: int = 0
     named: bool = True
-    lean: bool = False
+    lean: Grain | None = None
 
 
 @dataclass(frozen=True)
@@ -70,8 +76,9 @@ class Painter:
         outline = edge_of(layer, 0.5)
         if is_mixed(layer, self.canvas, MIXED * self.detail.levels):
             return self._pieces(part, name)
-        if self.detail.lean and outline is not None:
-            return lean(layer, outline, is_soft(layer, self.canvas), self.document)
+        if self.detail.lean:
+            blurred = self.plan.blurred.get(part.index)
+            return lean(layer, blurred, self.detail.lean, self.document) if blurred else ""
         if not is_soft(layer, self.canvas):
             return self._sharp(part, outline, name)
         if part.index in self.plan.blurred:
@@ -101,66 +108,66 @@ class Painter:
     def _bands(self, part: Part, name: str | None) -> str:
         layer = part.layer
         bands = band_levels(self.plan.bands[part.index])
-        tolerance = max(TOLERANCE, 0.15 * layer.falloff * self.canvas.unit / len(bands))
+        tolerance = min(max(TOLERANCE, 0.15 * layer.falloff * self.canvas.unit / len(bands)), LOOSEST)
         found = layer_contours(layer, [end * layer.falloff for end, _ in bands], self.canvas)
         covered = [(cover, contours) for contours, (_, cover) in zip(found, bands, strict=True)]
-        paths = [
-            tag("path", d=path_data(contours, tolerance, self.canvas), fill_opacity=added)
-            for contours, added in steps(covered)
-        ]
-        if not paths:
-            return ""
-        look = {
-            "fill": fill_of(layer, self.document),
-            "opacity": opacity_text(layer.opacity),
-        }
-        return tag("g", *paths, id=name, fill_rule="evenodd", **look)
+        return self._stacked(part, [(fill_of(layer, self.document), covered)], tolerance, name)
 
     def _pieces(self, part: Part, name: str | None) -> str:
         layer = part.layer
         spread = float(np.var([shape.color for shape in layer.shapes], axis=0).mean()) * layer.opacity**2
         count = max(self.plan.bands[part.index] // 2, band_count(spread, PIECES_COARSER * self.detail.levels))
-        tolerance = max(2.0 * TOLERANCE, 0.15 * layer.falloff * self.canvas.unit / count)
-        paths = []
-        pieces = piece_contours(layer, count, self.canvas)
-        for shape, bands in zip(layer.shapes, pieces, strict=True):
-            color = self.document.color(shape.color)
-            paths += [
-                tag("path", d=path_data(found, tolerance, self.canvas), fill=color, fill_opacity=added)
-                for found, added in steps(bands)
-            ]
-        return (
-            tag("g", *paths, id=name, fill_rule="evenodd", opacity=opacity_text(layer.opacity))
-            if paths
-            else ""
-        )
+        tolerance = min(max(2.0 * TOLERANCE, 0.15 * layer.falloff * self.canvas.unit / count), LOOSEST)
+        fills = [color_text(shape.color) for shape in layer.shapes]
+        pieces = list(zip(fills, piece_contours(layer, count, self.canvas), strict=True))
+        return self._stacked(part, pieces, tolerance, name)
+
+    def _stacked(
+        self, part: Part, pieces: list[tuple[str, Bands]], tolerance: float, name: str | None
+    ) -> str:
+        """Bands of one or several fills in a group."""
+        wide = self.plan.rings and part.layer.falloff * self.canvas.unit * self.canvas.pixels > NARROW
+        fill = pieces[0][0] if len(pieces) == 1 else None
+        apart = wide and fill is not None  # no two paths overlap: each can have the layer's opacity itself
+        paths = [
+            tag(
+                "path",
+                d=(polygon_data if wide else path_data)(contours, tolerance, self.canvas),
+                fill=own if fill is None else None,
+                fill_opacity=opacity_text(added * part.layer.opacity if apart else added),
+            )
+            for own, bands in pieces
+            for contours, added in (rings(bands) if wide else steps(bands))
+        ]
+        look = {
+            "fill": fill,
+            "fill_rule": "evenodd",
+            "shape_rendering": "crispEdges" if wide else None,
+            "opacity": None if apart else opacity_text(part.layer.opacity),
+        }
+        return tag("g", *paths, id=name, **look) if paths else ""
 
     def _blur(self, part: Part, blurred: Blurred, name: str | None) -> str:
-        look = {
-            "fill": fill_of(part.layer, self.document),
-            "opacity": opacity_text(part.layer.opacity),  # as the paint's, Chromium would round it down
-            "filter": url(self._filter(part.layer, blurred)),
-        }
-        return element(blurred.outline, self.canvas, id=name, **look)
+        if not blurred.deviation:
+            return element(blurred.outline, self.canvas, id=name, **self._look(part))
+        filter_ = url(self._filter(part.layer, blurred))
+        fill = fill_of(part.layer, self.document, self.plan.lift)
+        return element(upright(blurred.outline), self.canvas, id=name, fill=fill, filter=filter_)
 
     def _filter(self, layer: Layer, blurred: Blurred) -> str:
         deviation = self.canvas.fine(blurred.deviation * self.canvas.unit)
-        blur = tag("feGaussianBlur", stdDeviation=deviation)
+        steps = [tag("feGaussianBlur", stdDeviation=deviation)]
+        opacity = opacity_text(layer.opacity)  # here, for browsers round an attribute's down
+        if opacity is not None:
+            steps.append(tag("feComponentTransfer", tag("feFuncA", type="linear", slope=opacity)))
         region = self._region(layer, blurred)
-        return self.document.define("blur", "filter", blur, color_interpolation_filters="sRGB", **region)
+        return self.document.define("blur", "filter", *steps, color_interpolation_filters="sRGB", **region)
 
     def _region(self, layer: Layer, blurred: Blurred) -> dict[str, str]:
         """A filter region in shares of the element's box, so that shapes can share the filter."""
-        box = extent(layer)
-        margin = 3.0 * blurred.deviation
-        inner = extent(layer, 0.5)
-        shares = [
-            margin / max(side, 1e-6)
-            for side in (inner.right - inner.left, inner.bottom - inner.top)
-            if box is not None
-        ]
-        steps = [_at_least(share) for share in shares]
-        x, y = steps
+        margin, inner = 3.0 * blurred.deviation, extent(layer, 0.5)
+        sides = (inner.right - inner.left, inner.bottom - inner.top)
+        x, y = (_at_least(margin / max(side, 1e-6)) for side in sides)
         return {"x": f"-{x}%", "y": f"-{y}%", "width": f"{100 + 2 * x}%", "height": f"{100 + 2 * y}%"}
 
     def _look(self, part: Part) -> dict[str, str | None]:
@@ -170,18 +177,30 @@ class Painter:
         }
 
 
-def steps(bands: list[tuple[float, list[Points]]]) -> Iterator[tuple[list[Points], str | None]]:
-    """The contours of nested bands, and the opacity that each adds to reach its coverage."""
+def rings(bands: Bands) -> Iterator[tuple[list[Points], float]]:
+    """The contours around what lies between each band and the next, and the coverage there.
+
+    Drawn without antialiasing every pixel belongs to one ring: nothing adds up, so nothing is lost to rounding. Not
+    for cairo, which fills holes that are a single pixel wide.
+    """
+    for (cover, outer), (_, inner) in zip(bands, [*bands[1:], (1.0, [])], strict=True):
+        if outer:
+            yield outer + inner, cover
+
+
+def steps(bands: Bands) -> Iterator[tuple[list[Points], float]]:
+    """The contours of nested bands, and the opacity that each adds to reach its coverage: antialiased."""
     below = 0.0
     for cover, contours in bands:
         if contours:
-            yield contours, opacity_text((cover - below) / (1.0 - below))
+            yield contours, (cover - below) / (1.0 - below)
         below = cover
 
 
 def is_soft(layer: Layer, canvas: Canvas) -> bool:
     """Whether a layer's edge is too soft for antialiasing to draw it."""
-    return layer.falloff * canvas.unit > SHARP * min(1.0, canvas.unit / SMALL)
+    side = canvas.unit * canvas.pixels
+    return layer.falloff * side > SHARP * min(1.0, side / SMALL)
 
 
 def _at_least(share: float) -> int:
@@ -200,11 +219,16 @@ def edge_of(layer: Layer, falloffs: float) -> Outline | None:
 
 @dataclass(frozen=True)
 class Plan:
-    """Which layers are drawn by a blur, how many stops the gradients of each layer have, and how many bands."""
+    """Which layers are drawn by a blur, how many stops the gradients of each layer have, and how many bands.
+
+    `lift`: 8-bit levels that the colours of blurs are raised by. `rings`: whether wide bands are rings.
+    """
 
     blurred: dict[int, Blurred]
     stops: list[int]
     bands: list[int]
+    lift: float
+    rings: bool
 
 
 def plan(scene: Scene, canvas: Canvas, detail: Detail, blurs: bool) -> Plan:
@@ -212,7 +236,26 @@ def plan(scene: Scene, canvas: Canvas, detail: Detail, blurs: bool) -> Plan:
     weight = contrasts(scene) if scene.layers else np.zeros(0)
     stops = [stop_count(w, detail.levels) for w in weight.tolist()]
     bands = [band_count(w, BANDS_COARSER * detail.levels) for w in weight.tolist()]
-    return Plan(_choose_blurs(scene, canvas, weight, detail.target) if blurs else {}, stops, bands)
+    if detail.lean:
+        blurred = _lean_blurs(scene, canvas, detail.lean)
+    else:
+        blurred = _choose_blurs(scene, canvas, weight, detail.target) if blurs else {}
+    return Plan(blurred, stops, bands, TRANSPARENT_LIFT if scene.background is None else 0.0, blurs)
+
+
+def _lean_blurs(scene: Scene, canvas: Canvas, grain: Grain) -> dict[int, Blurred]:
+    """All layers as blurs with few classes."""
+    falloffs = [layer.falloff if is_soft(layer, canvas) else 0.0 for layer in scene.layers]
+    deviations = softnesses(falloffs, canvas, grain.softnesses)
+    tried = (
+        lean_blur(layer, edge_of(layer, 0.5), deviation, canvas)
+        for layer, deviation in zip(scene.layers, deviations, strict=True)
+    )
+    return {index: blurred for index, blurred in enumerate(tried) if blurred is not None}
+
+
+def _worst(blurred: Blurred) -> float:
+    return max(blurred.error, CUT * blurred.error_cut if blurred.error_cut > 2.0 * blurred.error else 0.0)
 
 
 def _choose_blurs(scene: Scene, canvas: Canvas, weight: Array, target: float) -> dict[int, Blurred]:
@@ -221,7 +264,7 @@ def _choose_blurs(scene: Scene, canvas: Canvas, weight: Array, target: float) ->
     soft = {i: layer for i, layer in enumerate(scene.layers) if is_soft(layer, canvas)}
     tried = {index: best_blur(layer, size) for index, layer in soft.items()}
     found = {index: blurred for index, blurred in tried.items() if blurred is not None}
-    energy = {index: blurred.error * float(weight[index]) for index, blurred in found.items()}
+    energy = {index: _worst(blurred) * float(weight[index]) for index, blurred in found.items()}
     allowed = 10 ** (-target / 10) * scene.extent[0] * scene.extent[1]
     kept = sorted(energy, key=lambda index: (energy[index], index))
     total = np.cumsum([energy[index] for index in kept])

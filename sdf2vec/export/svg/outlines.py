@@ -3,23 +3,34 @@
 from __future__ import annotations
 
 import math
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from functools import singledispatch
 
 import numpy as np
 
 from ...shapes import EllipseOutline, Outline, PolygonOutline, RectangleOutline
 from .canvas import Canvas, Points, tag
+from .curves import path_data
 from .field import Array, Grid
 
 FLAT = 1e-9  # scene units: a side shorter than this is none
 LONGEST_MITRE = 4.0  # in lengths that the sides are moved by
+TOLERANCE = 0.05  # user units that a traced contour may be off
+
+
+@dataclass(frozen=True, eq=False)
+class Traced:
+    """Closed contours [M, 2] in scene units, holes among them; `tolerance` in user units."""
+
+    contours: tuple[Points, ...]
+    tolerance: float = TOLERANCE
+
 
 # --- elements ----------------------------------------------------------------------------------------------
 
 
 @singledispatch
-def element(outline: Outline, canvas: Canvas, **paint: str | None) -> str:
+def element(outline: Outline | Traced, canvas: Canvas, **paint: str | None) -> str:
     """The outline as one element."""
     raise NotImplementedError(type(outline))
 
@@ -57,17 +68,35 @@ def _(outline: PolygonOutline, canvas: Canvas, **paint: str | None) -> str:
     return tag("path", d=_rounded_path(points, outline.rounding * canvas.unit, canvas), **paint)
 
 
+@element.register
+def _(outline: Traced, canvas: Canvas, **paint: str | None) -> str:
+    contours = [canvas.places(contour) for contour in outline.contours]
+    return tag("path", d=path_data(contours, outline.tolerance, canvas), fill_rule="evenodd", **paint)
+
+
 def turn(angle: float, x: float, y: float, canvas: Canvas) -> str | None:
     """A rotation about a point, None for none."""
     degrees = canvas.fine(math.degrees(angle) % 180.0)
     return None if degrees == "0" else f"rotate({degrees} {canvas.number(x)} {canvas.number(y)})"
 
 
+def upright(outline: Outline | Traced) -> Outline | Traced:
+    """The same without a turned element: librsvg blurs what is turned by other widths."""
+    if isinstance(outline, RectangleOutline) and outline.angle:
+        points, rounding = core(outline) or (np.zeros((1, 2)), 0.0)
+        return PolygonOutline(tuple((x, y) for x, y in points.tolist()), rounding)
+    return outline
+
+
 def _rounded_path(points: Points, rounding: float, canvas: Canvas) -> str:
     """Straight edges moved outwards, joined by arcs."""
     corners = convex(points)
     moved = [(a + n * rounding, b + n * rounding) for a, b, n in sides(corners)] or [(points[0],) * 2]
-    arc = f"A{canvas.number(rounding)} {canvas.number(rounding)} 0 0 1 "
+    # Half a circle must not be flattened because its ends were rounded towards each other; too small a radius grows.
+    radius = canvas.number(
+        rounding if len(corners) > 2 else max(rounding - 10.0**-canvas.digits, 0.5 * rounding)
+    )
+    arc = f"A{radius} {radius} 0 0 1 "
     edges = [f"{canvas.joined(a[None])}L{canvas.joined(b[None])}" for a, b in moved]
     first = canvas.joined(moved[0][0][None])
     return "M" + arc.join(edges) + arc + first + "Z"
@@ -150,9 +179,9 @@ def _(outline: PolygonOutline, share: float) -> Outline:
     return PolygonOutline(tuple((x, y) for x, y in points), outline.rounding * share)
 
 
-def distance_to(outline: Outline, grid: Grid) -> Array:
+def distance_to(outline: Outline | Traced, grid: Grid) -> Array:
     """Signed distances [Y, X] to an outline made of a convex polygon."""
-    made = core(outline)
+    made = None if isinstance(outline, Traced) else core(outline)
     assert made is not None
     points, rounding = made
     x, y = grid.x[None, :], grid.y[:, None]

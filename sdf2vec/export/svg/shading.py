@@ -9,7 +9,7 @@ import numpy as np
 
 from ...scene import Layer
 from .bands import seen
-from .canvas import Canvas, Document, mean_color, number, tag, url
+from .canvas import Canvas, Document, color_text, mean_color, number, tag, url
 from .field import Array, colors, covers, grid_over
 
 STOPS = 7
@@ -25,11 +25,11 @@ class Shade(NamedTuple):
     error: float
 
 
-def fill_of(layer: Layer, document: Document) -> str:
-    """A colour, or a gradient along the direction in which the union's colour changes most."""
+def fill_of(layer: Layer, document: Document, lift: float = 0.0) -> str:
+    """A colour, or a gradient along the direction in which the union's colour changes most; `lift` in 8-bit levels."""
     shade = shade_of(layer, document.canvas)
     if shade is None:
-        return document.color(mean_color([shape.color for shape in layer.shapes]))
+        return color_text(mean_color([shape.color for shape in layer.shapes]), lift)
     return url(_gradient(shade, document))
 
 
@@ -84,7 +84,7 @@ def _gradient(shade: Shade, document: Document) -> str:
     """The gradient's id."""
     canvas = document.canvas
     stops = [
-        tag("stop", offset=number(i / (STOPS - 1), 3), stop_color=document.color(value))
+        tag("stop", offset=number(i / (STOPS - 1), 3), stop_color=color_text(value))
         for i, value in enumerate(shade.colors.tolist())
     ]
     (x1, y1), (x2, y2) = canvas.places(shade.places[[0, -1]]).tolist()

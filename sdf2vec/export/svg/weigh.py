@@ -40,16 +40,22 @@ def contrasts(scene: Scene) -> Array:
     return found
 
 
-def layers_at(scene: Scene, side: int) -> tuple[Array, Array]:
+def layers_at(scene: Scene, side: int, most: int = MOST) -> tuple[Array, Array]:
     """Coverage [N, P] and colour [N, 3, P or 1] of all layers on a small canvas of the scene's shape."""
     from ...render import reference
     from ...render.tensors import from_scene
 
-    shortest = min(scene.width, scene.height)
-    most = (MOST / max(1, len(scene.layers)) * shortest**2 / (scene.width * scene.height)) ** 0.5
-    scale = min(side, max(8, int(most)), shortest) / shortest
-    width, height = max(1, round(scene.width * scale)), max(1, round(scene.height * scale))
+    width, height = small_canvas(scene, side, most)
     tensors = from_scene(scene)
     x, y, pixel = reference.canvas(tensors, width, height)
+    scale = min(width, height) / min(scene.width, scene.height)
     covers, colors = reference.layers_at(tensors, x, y, pixel * scale)
     return covers.double().numpy(), colors.double().numpy()
+
+
+def small_canvas(scene: Scene, side: int, most: int = MOST) -> tuple[int, int]:
+    """Width and height of a canvas with `side` pixels along its shortest, fewer where there are many layers."""
+    shortest = min(scene.width, scene.height)
+    allowed = (most / max(1, len(scene.layers)) * shortest**2 / (scene.width * scene.height)) ** 0.5
+    scale = min(side, max(8, int(allowed)), shortest) / shortest
+    return max(1, round(scene.width * scale)), max(1, round(scene.height * scale))

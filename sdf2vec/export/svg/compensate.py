@@ -1,0 +1,228 @@
+"""Colours and opacities solved again against the coverage that the drawing really has.
+
+A blur is only near a layer's coverage, and where many edges lie on each other all are off in the same direction.
+Colours are in the picture linearly, and so, nearly, are opacities: each is solved by least squares in turn, near
+to what it was and within its range.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, replace
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...scene import Layer, Scene
+from .field import Array, Grid
+from .weigh import layers_at, small_canvas
+
+SIDE = 128  # pixels along the shortest side of the picture that is solved for
+MOST = 1 << 23  # layers × pixels
+LARGEST = 4096  # layers: more equations than these are not solved
+ROUNDS = 3  # of opacities, then colours
+RIDGE = 1e-3  # how much, of a mean layer's weight, the old value counts
+FREEDOM = 0.1  # that an opacity may change by
+
+Single = NDArray[np.float32]
+
+
+class Difference(NamedTuple):
+    """Drawn coverage minus the layer's own, [Y, X] on a grid."""
+
+    grid: Grid
+    off: Array
+
+
+def compensated(scene: Scene, drawn: Mapping[int, Difference], colors: int = 0, opacities: int = 0) -> Scene:
+    """The scene with the colours and opacities whose drawing is nearest to the scene's render.
+
+    `drawn`: what is off about the layers that are not drawn exactly. `colors`, `opacities`: these become whole
+    numbers of so many steps; the colours are chosen together, so that the error of one makes up for another's.
+    0 leaves them free. Only `over`.
+    """
+    if not scene.layers or len(scene.layers) > LARGEST or not (drawn or colors):
+        return scene
+    stack, wanted = _stack(scene, drawn)
+    best, least = stack, stack.error(wanted)
+    for _ in range(ROUNDS if drawn else 0):
+        stack = stack.with_opacities(wanted).with_colors(wanted)
+        if (error := stack.error(wanted)) < least:
+            best, least = stack, error
+    return best.rounded(wanted, colors, opacities).painted(scene) if colors else best.painted(scene)
+
+
+@dataclass(frozen=True)
+class Stack:
+    """Layers on a small canvas: coverage [N, P] as drawn, colours [N, 3, P or 1], opacities [N]; a ground or none.
+
+    `first`: colours and opacities before anything was solved. `plain` [N]: whether a layer has a single colour.
+    """
+
+    covers: Single
+    colors: Array
+    opacities: Array
+    ground: Array | None  # [3]
+    plain: NDArray[np.bool_]
+    first: tuple[Array, Array]
+
+    @property
+    def alphas(self) -> Single:
+        return np.asarray(self.covers * self.opacities[:, None].astype(np.float32))
+
+    def shown(self) -> tuple[Single, Single]:
+        """How much of each layer shows through those above it [N, P], and of the ground [P]."""
+        through = 1.0 - self.alphas
+        hidden = np.ones_like(through)
+        hidden[:-1] = np.cumprod(through[:0:-1], axis=0)[::-1]
+        return hidden, hidden[0] * through[0]
+
+    def picture(self) -> Array:
+        """Premultiplied colour and, without a ground, alpha [3 or 4, P]."""
+        hidden, rest = self.shown()
+        weights = hidden * self.alphas
+        color = sum(np.multiply(weight, color) for weight, color in zip(weights, self.colors, strict=True))
+        if self.ground is not None:
+            return np.asarray(color + self.ground[:, None] * rest, np.float64)
+        return np.concatenate([color, 1.0 - rest[None]]).astype(np.float64)
+
+    def error(self, wanted: Array) -> float:
+        """Mean squared difference from a picture."""
+        return float(np.mean(np.square(self.picture() - wanted)))
+
+    def with_colors(self, wanted: Array) -> Stack:
+        """The single colours that come nearest to a picture [3 or 4, P]."""
+        gram, right = self._color_equations(wanted)
+        solved = _bounded(gram, right, np.zeros_like(right), np.ones_like(right))
+        return self._recolored(solved)
+
+    def rounded(self, wanted: Array, steps: int, opacities: int) -> Stack:
+        """Opacities in whole steps, never 0, and the single colours in steps that then come nearest to a picture."""
+        shown = np.maximum(np.round(self.opacities * opacities), 1.0) / opacities
+        return replace(self, opacities=shown)._stepped(wanted, steps)
+
+    def _stepped(self, wanted: Array, steps: int) -> Stack:
+        """The colours in steps, changed one by one while that brings them nearer."""
+        gram, right = self._color_equations(wanted)
+        colors = np.round(self.colors.mean(axis=2)[self.plain] * steps) / steps
+        for _ in range(20):
+            before = colors.copy()
+            for i in range(len(colors)):
+                best = colors[i] + (right[i] - gram[i] @ colors) / gram[i, i]
+                colors[i] = np.round(np.clip(best, 0.0, 1.0) * steps) / steps
+            if np.array_equal(colors, before):
+                break
+        return self._recolored(colors)
+
+    def with_opacities(self, wanted: Array) -> Stack:
+        """The opacities that come nearest to a picture [3 or 4, P], where one layer's change leaves the others'."""
+        slopes = np.stack([slope.astype(np.float32).ravel() for slope in self._slopes()])
+        off = (wanted - self.picture()).astype(np.float32).ravel()
+        first = self.first[1]
+        gram, ridge = _ridged(slopes)
+        right = (
+            (slopes @ off).astype(np.float64)
+            + ridge * first
+            + (gram - ridge * np.eye(len(gram))) @ self.opacities
+        )
+        low, high = np.maximum(first - FREEDOM, 0.0), np.minimum(first + FREEDOM, 1.0)
+        return replace(self, opacities=_bounded(gram, right[:, None], low[:, None], high[:, None])[:, 0])
+
+    def painted(self, scene: Scene) -> Scene:
+        """The scene with this stack's colours and opacities."""
+        means = self.colors.mean(axis=2).tolist()
+        layers = [
+            _painted(layer, means[i] if self.plain[i] else None, opacity)
+            for i, (layer, opacity) in enumerate(zip(scene.layers, self.opacities.tolist(), strict=True))
+        ]
+        return replace(scene, layers=tuple(layers))
+
+    def _slopes(self) -> Iterator[Array]:
+        """For each layer the change of the picture [3 or 4, P] with its opacity."""
+        hidden, _ = self.shown()
+        below = np.zeros((4, self.covers.shape[1]))
+        if self.ground is not None:
+            below += np.array([*self.ground, 1.0])[:, None]
+        channels = 4 if self.ground is None else 3
+        for cover, alpha, color, through in zip(self.covers, self.alphas, self.colors, hidden, strict=True):
+            own = np.concatenate([np.broadcast_to(color, (3, len(cover))), np.ones((1, len(cover)))])
+            yield ((own - below) * (cover * through))[:channels]
+            below = below + (own - below) * alpha
+
+    def _color_equations(self, wanted: Array) -> tuple[Array, Array]:
+        """Gram matrix and right side of the least squares for the single colours."""
+        weights = (self.shown()[0] * self.alphas)[self.plain]
+        own = self.colors.mean(axis=2)[self.plain]
+        off = (wanted - self.picture())[:3].astype(np.float32)
+        gram, ridge = _ridged(weights)
+        first = self.first[0].mean(axis=2)[self.plain]
+        plain = gram - ridge * np.eye(len(gram))
+        return gram, (weights @ off.T).astype(np.float64) + plain @ own + ridge * first
+
+    def _recolored(self, solved: Array) -> Stack:
+        colors = self.colors.copy()
+        colors[self.plain] = solved[:, :, None]
+        return replace(self, colors=colors)
+
+
+def _stack(scene: Scene, drawn: Mapping[int, Difference]) -> tuple[Stack, Array]:
+    """The scene's layers as they are drawn, and its render, on a small canvas."""
+    covers, colors = layers_at(scene, SIDE, MOST)
+    ground = None if scene.background is None else np.array(scene.background)
+    opacities = np.array([layer.opacity for layer in scene.layers])
+    plain = np.array([len({shape.color for shape in layer.shapes}) == 1 for layer in scene.layers])
+    exact = Stack(covers.astype(np.float32), colors, opacities, ground, plain, (colors, opacities))
+    width, height = small_canvas(scene, SIDE, MOST)
+    x = (np.arange(width) + 0.5 - width / 2) / min(width, height)
+    y = (np.arange(height) + 0.5 - height / 2) / min(width, height)
+    off = exact.covers.copy()
+    for index, difference in drawn.items():
+        _add(difference, x, y, off[index].reshape(height, width))
+    return replace(exact, covers=np.clip(off, 0.0, 1.0)), exact.picture()
+
+
+def _add(difference: Difference, x: Array, y: Array, cover: Single) -> None:
+    """Adds a difference to coverage [Y, X] at the places x and y, interpolated."""
+    from scipy.ndimage import map_coordinates
+
+    grid, off = difference
+    across, down = (x - grid.x[0]) / grid.step, (y - grid.y[0]) / grid.step
+    columns = np.flatnonzero((across > -0.5) & (across < len(grid.x) - 0.5))
+    rows = np.flatnonzero((down > -0.5) & (down < len(grid.y) - 0.5))
+    if columns.size and rows.size:
+        places = np.meshgrid(down[rows], across[columns], indexing="ij")
+        cover[np.ix_(rows, columns)] += map_coordinates(off, places, order=1, mode="nearest")
+
+
+def _ridged(rows: Single) -> tuple[Array, float]:
+    """The Gram matrix of rows [N, M] with a ridge, and the ridge."""
+    gram = (rows @ rows.T).astype(np.float64)
+    ridge = RIDGE * float(np.trace(gram)) / len(gram) + 1e-12 if len(gram) else 0.0
+    return gram + ridge * np.eye(len(gram)), ridge
+
+
+def _bounded(gram: Array, right: Array, low: Array, high: Array) -> Array:
+    """Solves gram·x = right [N, K] within bounds: what leaves them is put there, and the rest solved again."""
+    found = np.empty_like(right)
+    for k in range(right.shape[1]):
+        free, x = np.ones(len(gram), bool), np.zeros(len(gram))
+        for _ in range(6):
+            x[free] = np.linalg.solve(
+                gram[np.ix_(free, free)], right[free, k] - gram[np.ix_(free, ~free)] @ x[~free]
+            )
+            outside = free & ((x < low[:, k]) | (x > high[:, k]))
+            x = np.clip(x, low[:, k], high[:, k])
+            if not outside.any():
+                break
+            free &= ~outside
+        found[:, k] = x
+    return found
+
+
+def _painted(layer: Layer, color: list[float] | None, opacity: float) -> Layer:
+    if color is None:
+        return replace(layer, opacity=opacity)
+    red, green, blue = color
+    shapes = tuple(replace(shape, color=(red, green, blue)) for shape in layer.shapes)
+    return replace(layer, shapes=shapes, opacity=opacity)

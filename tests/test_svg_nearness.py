@@ -1,0 +1,226 @@
+"""What brings an SVG near to the render: compensation, standard deviations, rings, traced blurs, small drawings."""
+
+import gzip
+import math
+import random
+import re
+from dataclasses import replace
+from xml.etree import ElementTree
+
+import numpy as np
+import pytest
+import torch
+
+from sdf2vec import Layer, Scene, Shape
+from sdf2vec.engines import ENGINES
+from sdf2vec.export.options import Options
+from sdf2vec.export.svg import svg as write_svg
+from sdf2vec.export.svg.blur import STEPS
+from sdf2vec.export.svg.canvas import Canvas
+from sdf2vec.export.svg.compensate import Difference, compensated
+from sdf2vec.export.svg.field import covers, extent, grid_over
+from sdf2vec.export.svg.outlines import element
+from sdf2vec.image import premultiply
+from sdf2vec.render.reference import render
+from sdf2vec.shapes import PolygonOutline
+
+Numbers = dict[str, float | tuple[float, ...]]
+NAMESPACE = "{http://www.w3.org/2000/svg}"
+BLURRING = ["resvg", "librsvg", "chromium", "firefox"]
+
+
+def off_in(engine, scene, size=None, **options):
+    """Drawn minus rendered, premultiplied [H, W, 4], 0..1."""
+    width, height = size or (scene.width, scene.height)
+    text = write_svg(scene, Options(**options))
+    drawn = premultiply(ENGINES[engine].render(text, width, height))
+    return drawn - render(scene, width, height, dtype=torch.float64).permute(1, 2, 0).numpy()
+
+
+def decibels(off):
+    return -10 * math.log10(float(np.mean(np.square(off))))
+
+
+# --- colours and opacities solved again --------------------------------------------------------------------
+
+
+def disc(opacity=0.5, color=(0.2, 0.4, 0.6)):
+    return Layer((Shape.of("circle", color, center=(0, 0), radius=0.3),), 0.2, opacity)
+
+
+def test_an_opacity_makes_up_for_coverage_that_is_too_little():
+    """Nine tenths of the coverage want ten ninths of the opacity, and the same colour."""
+    scene = Scene(120, 80, (disc(),), None)
+    grid = grid_over(extent(scene.layers[0]), 0.004)
+    missing = {0: Difference(grid, -0.1 * covers(scene.layers[0], grid, 1 / 80))}
+    (layer,) = compensated(scene, missing).layers
+    assert layer.opacity == pytest.approx(0.5 / 0.9, abs=2e-3)
+    assert layer.shapes[0].color == pytest.approx((0.2, 0.4, 0.6), abs=2e-3)
+
+
+def test_what_is_drawn_exactly_stays():
+    scene = Scene(120, 80, (disc(), disc(0.3)), (0.1, 0.2, 0.3))
+    assert compensated(scene, {}) == scene
+
+
+def test_colours_in_steps_make_up_for_each_other():
+    """Fifteen steps chosen together are nearer to the picture than each colour's nearest step."""
+    r = random.Random(3)
+    layers = []
+    for _ in range(60):
+        color = (r.random(), r.random(), r.random())
+        place = (r.uniform(-0.6, 0.6), r.uniform(-0.4, 0.4))
+        layers.append(Layer((Shape.of("circle", color, center=place, radius=r.uniform(0.1, 0.3)),), 0.1, 0.5))
+    scene = Scene(120, 80, tuple(layers), (0.5, 0.5, 0.5))
+    chosen = compensated(scene, {}, 15, 10)
+    steps = np.array([layer.shapes[0].color for layer in chosen.layers]) * 15
+    assert np.allclose(steps, np.round(steps), atol=1e-3)
+    nearest = replace(scene, layers=tuple(in_steps(layer, 15) for layer in scene.layers))
+    wanted = render(scene)
+    errors = [float((render(other) - wanted).square().mean()) for other in (chosen, nearest)]
+    assert errors[0] < 0.5 * errors[1]
+
+
+def in_steps(layer, count):
+    color = tuple(round(count * channel) / count for channel in layer.shapes[0].color)
+    return replace(layer, shapes=(replace(layer.shapes[0], color=color),))
+
+
+@pytest.mark.parametrize("engine", BLURRING)
+def test_many_soft_edges_on_each_other(engine, require_engine):
+    """Where blurs lie on each other on no ground, all are off in one direction: the hard case for a soft cut-out."""
+    require_engine(engine)
+    r = random.Random(1)
+    layers = []
+    for _ in range(48):
+        angle, color = r.uniform(0, 7), (r.uniform(0.2, 0.9), r.uniform(0.2, 0.9), r.uniform(0.2, 0.9))
+        place = (0.25 * math.cos(angle), 0.25 * math.sin(angle))
+        box = Shape.of(
+            "box", color, center=place, half_size=(0.12, 0.06), angle=angle + 1.57, corner_radius=0.02
+        )
+        layers.append(Layer((box,), r.uniform(0.05, 0.12), r.uniform(0.5, 1.0)))
+    scene = Scene(240, 240, tuple(layers), None)
+    assert "feGaussianBlur" in write_svg(scene, Options())
+    for size in (None, (480, 480), (360, 250)):
+        off = off_in(engine, scene, size)
+        assert decibels(off) >= 42
+        assert abs(off[..., :3].mean()) <= 0.5 / 255
+
+
+# --- blurs -------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("engine", BLURRING)
+@pytest.mark.parametrize("scale", [1, 2])
+def test_at_these_deviations_boxes_are_near_a_gaussian(engine, scale, require_engine):
+    """The edge of a half-plane, blurred, is the error function; renderers put boxes in the place of the Gaussian."""
+    require_engine(engine)
+    side, worst = 120, {}
+    x = np.arange(side * scale) + 0.5
+    for deviation in STEPS:
+        blur = f'<feGaussianBlur stdDeviation="{deviation}"/>'
+        region = 'filterUnits="userSpaceOnUse" x="-60" y="-60" width="240" height="240"'
+        text = (
+            f'<svg xmlns="http://www.w3.org/2000/svg" width="{side}" height="{side}" viewBox="0 0 {side} {side}">'
+            f'<filter id="a" {region} color-interpolation-filters="sRGB">{blur}</filter><rect width="100%" '
+            f'height="100%"/><rect x="40" width="40" height="{side}" fill="#fff" filter="url(#a)"/></svg>'
+        )
+        drawn = ENGINES[engine].render(text, side * scale, side * scale)[side * scale // 2, :, 0]
+        spread = deviation * scale * math.sqrt(2)
+        exact = [0.5 * (math.erf((v - 40 * scale) / spread) - math.erf((v - 80 * scale) / spread)) for v in x]
+        worst[deviation] = float(np.abs(drawn - exact).max())
+    assert max(worst.values()) <= 0.025, worst
+
+
+@pytest.mark.parametrize("engine", BLURRING)
+def test_turned_boxes_are_blurred_alike_in_all_directions(engine, require_engine):
+    """librsvg turns standard deviations as if they were distances: what is blurred must not be a turned element."""
+    require_engine(engine)
+    numbers: Numbers = {"center": (0, 0), "half_size": (0.3, 0.1), "angle": 0.8, "corner_radius": 0.0}
+    box = Layer((Shape.of("box", (0.3, 0.3, 0.3), **numbers),), 0.15)
+    scene = Scene(300, 200, (box,), (0.2, 0.2, 0.2))
+    text = write_svg(scene, Options())
+    assert "feGaussianBlur" in text
+    assert 255 * np.abs(off_in(engine, scene)).max() <= 3
+
+
+def test_half_circles_are_whole():
+    """Ends rounded towards each other would flatten an arc of half a turn by pixels; a small radius grows instead."""
+    r = random.Random(1)
+    canvas = Canvas.of(Scene(512, 512, (), None))
+    for _ in range(100):
+        ends = tuple((r.uniform(-0.5, 0.5), r.uniform(-0.5, 0.5)) for _ in range(2))
+        path = ElementTree.fromstring(element(PolygonOutline(ends, r.uniform(0.01, 0.2)), canvas))
+        move, *arcs = re.findall(r"[A-Z][^A-Z]*", path.get("d", ""))
+        corners = [
+            [float(v) for v in command[1:].split()][-2:] for command in (move, *arcs) if command != "Z"
+        ]
+        radii = [float(command[1:].split()[0]) for command in arcs if command[0] == "A"]
+        (across, back) = (math.dist(corners[1], corners[2]), math.dist(corners[3], corners[4]))
+        assert len(radii) == 2
+        assert 2 * radii[0] <= across < 2 * radii[0] + 0.5
+        assert 2 * radii[1] <= back < 2 * radii[1] + 0.5
+
+
+@pytest.mark.parametrize("engine", BLURRING)
+def test_a_traced_blur(engine, require_engine):
+    """One element for a displaced circle of little contrast, at the fitted size and others."""
+    require_engine(engine)
+    numbers: Numbers = {"center": (0, 0), "radius": 0.28, "amplitude": 0.03, "frequency": (9, 8)}
+    layer = Layer((Shape.of("displaced", (0.5, 0.4, 0.3), **numbers),), 0.12, 0.7)
+    scene = Scene(300, 220, (layer,), (0.4, 0.4, 0.4))
+    root = ElementTree.fromstring(write_svg(scene, Options()))
+    (path,) = root.findall(f"{NAMESPACE}path")
+    assert path.get("filter")
+    for size in ((300, 220), (600, 440), (405, 297)):
+        off = off_in(engine, scene, size)
+        assert 255 * np.abs(off).max() <= 3
+        assert abs(off.mean()) <= 0.3 / 255
+
+
+# --- rings -------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("engine", "profile"), [*((e, "filters") for e in BLURRING), ("cairosvg", "portable")]
+)
+def test_bands_leave_no_gaps(engine, profile, require_engine):
+    """No pixel is in two rings (but in cairo, where a hole is one pixel wide) or in none."""
+    require_engine(engine)
+    numbers: Numbers = {"center": (0.4, 0), "radius": 0.3, "amplitude": 0.1, "frequency": (12, 9)}
+    layer = Layer((Shape.of("displaced", (1, 1, 1), **numbers),), 0.4, 0.8)
+    scene = Scene(150, 100, (layer,), (0, 0, 0))
+    assert ("crispEdges" in write_svg(scene, Options(svg_profile=profile))) == (profile == "filters")
+    for size in ((150, 100), (300, 200), (450, 300), (615, 410)):
+        off = off_in(engine, scene, size, svg_profile=profile)
+        wrong = np.count_nonzero(255 * np.abs(off).max(axis=2) > 16)
+        assert wrong <= (6 if engine == "librsvg" else 0)
+        assert abs(off.mean()) <= (0.5 if profile == "filters" else 2.0) / 255
+
+
+# --- the smallest drawing ----------------------------------------------------------------------------------
+
+
+def test_the_smallest_drawing_says_a_triangle_in_few_bytes():
+    """Whole coordinates, three digits of colour, one of opacity: gzipped, at most 16 bytes a triangle at 256."""
+    r = random.Random(7)
+    layers = []
+    for _ in range(256):
+        x, y = r.uniform(-0.5, 0.5), r.uniform(-0.5, 0.5)
+        corners = {name: (x + r.gauss(0, 0.15), y + r.gauss(0, 0.15)) for name in "abc"}
+        color = (r.random(), r.random(), r.random())
+        layers.append(
+            Layer((Shape.of("triangle", color, **corners),), r.uniform(0.01, 0.2), r.uniform(0.4, 1.0))
+        )
+    scene = Scene(256, 256, tuple(layers), (0.5, 0.5, 0.5))
+    text = write_svg(scene, Options(svg_size_limit=24000))
+    root = ElementTree.fromstring(text)
+    assert root.get("viewBox") == "0 0 128 128"
+    assert root.get("width") == "256"
+    (group,) = (element for element in root if element.tag == f"{NAMESPACE}g")
+    assert len(group) == 256
+    for path in group:
+        assert len(path.get("color", "")) == 4
+        assert len(path.get("opacity", ".1")) == 2
+        assert "." not in path.get("d", ".")
+    assert len(gzip.compress(text.encode(), 9)) <= 4700
