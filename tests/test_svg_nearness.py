@@ -15,10 +15,10 @@ from sdf2vec import Layer, Scene, Shape
 from sdf2vec.engines import ENGINES
 from sdf2vec.export.options import Options
 from sdf2vec.export.svg import svg as write_svg
-from sdf2vec.export.svg.blur import STEPS
+from sdf2vec.export.svg.blur import STEPS, trial_of
 from sdf2vec.export.svg.canvas import Canvas
 from sdf2vec.export.svg.compensate import Difference, compensated
-from sdf2vec.export.svg.field import covers, extent, grid_over
+from sdf2vec.export.svg.field import covers, distances, extent, grid_over
 from sdf2vec.export.svg.outlines import element
 from sdf2vec.image import premultiply
 from sdf2vec.render.reference import render
@@ -103,7 +103,7 @@ def test_many_soft_edges_on_each_other(engine, require_engine):
     assert "feGaussianBlur" in write_svg(scene, Options())
     for size in (None, (480, 480), (360, 250)):
         off = off_in(engine, scene, size)
-        assert decibels(off) >= 42
+        assert decibels(off) >= {"resvg": 45, "librsvg": 43.5}.get(engine, 42)  # 3 less without compensation
         assert abs(off[..., :3].mean()) <= 0.5 / 255
 
 
@@ -176,6 +176,15 @@ def test_a_traced_blur(engine, require_engine):
         off = off_in(engine, scene, size)
         assert 255 * np.abs(off).max() <= 3
         assert abs(off.mean()) <= 0.3 / 255
+
+
+def test_a_traced_contour_moves_to_where_its_blur_is_one_half():
+    """Where an outline bends, its blur lies inside of it."""
+    numbers: Numbers = {"center": (0, 0), "radius": 0.1, "amplitude": 0.03, "frequency": (9, 8)}
+    layer = Layer((Shape.of("displaced", (1, 1, 1), **numbers),), 0.15)
+    trial = trial_of(layer, (300, 220, 220.0), 128, 128)
+    still, *moved = trial.moved(distances(layer, trial.grid) - 0.075, 1.0)
+    assert moved[-1].error < 0.7 * still.error
 
 
 # --- rings -------------------------------------------------------------------------------------------------
