@@ -222,9 +222,9 @@ def test_the_smallest_drawing_says_a_triangle_in_few_bytes():
             Layer((Shape.of("triangle", color, **corners),), r.uniform(0.01, 0.2), r.uniform(0.4, 1.0))
         )
     scene = Scene(256, 256, tuple(layers), (0.5, 0.5, 0.5))
-    text = write_svg(scene, Options(svg_size_limit=24000))
+    text = write_svg(scene, Options(svg_size_limit=22000))
     root = ElementTree.fromstring(text)
-    assert root.get("viewBox") == "0 0 128 128"
+    assert root.get("viewBox") == "0 0 160 160"
     assert root.get("width") == "256"
     (group,) = (element for element in root if element.tag == f"{NAMESPACE}g")
     assert len(group) == 256

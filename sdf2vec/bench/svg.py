@@ -21,7 +21,8 @@ from numpy.typing import NDArray
 from .. import api
 from ..engines import ENGINES
 from ..export import export
-from ..export.options import SVG_PROFILES, Options
+from ..export.options import Options
+from ..export.svg import smallest
 from ..files import write_atomically
 from ..image import Picture, load, premultiply
 from ..render.draw import draw
@@ -29,8 +30,10 @@ from ..scene import Scene
 
 Pixels = NDArray[np.float64]  # [H, W, 4] premultiplied RGBA, 0..1
 
+SMALLEST = "smallest"  # the smallest drawing with filters
 RENDERERS = {
     "filters": ("resvg", "librsvg", "chromium", "firefox"),
+    SMALLEST: ("resvg", "librsvg", "chromium", "firefox"),
     "portable": ("resvg", "librsvg", "chromium", "firefox", "cairosvg"),
 }
 HEAD = (
@@ -86,13 +89,12 @@ def psnr(drawn: Pixels, wanted: Pixels) -> float:
 
 
 def rows(name: str, scene: Scene, picture: Picture, kind: str) -> Iterator[Row]:
-    """All renderers present, both profiles."""
+    """All renderers present, both profiles and the smallest drawing."""
     width, height = scene.width, scene.height
     once, twice = (_render(scene, factor * width, factor * height) for factor in (1, 2))
     original = _original(picture)
-    for profile in SVG_PROFILES:
-        text = export(scene, "svg", Options(svg_profile=profile, title=name))
-        assert isinstance(text, str)
+    for profile in RENDERERS:
+        text = _text(scene, profile, name)
         sizes = len(text.encode()), len(gzip.compress(text.encode(), 9, mtime=0))
         for renderer in RENDERERS[profile]:
             if ENGINES[renderer].missing():
@@ -104,6 +106,14 @@ def rows(name: str, scene: Scene, picture: Picture, kind: str) -> Iterator[Row]:
             gained = psnr(drawn, original) - psnr(once, original)
             figures = (psnr(drawn, once), psnr(larger, twice), 255 * float((drawn - once)[..., :3].mean()))
             yield Row(name, kind, scene.shape_count, profile, *sizes, renderer, *figures, gained, seconds)
+
+
+def _text(scene: Scene, profile: str, name: str) -> str:
+    if profile == SMALLEST:
+        return smallest(scene, Options(title=name))
+    text = export(scene, "svg", Options(svg_profile=profile, title=name))
+    assert isinstance(text, str)
+    return text
 
 
 def _render(scene: Scene, width: int, height: int) -> Pixels:

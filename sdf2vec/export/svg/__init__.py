@@ -93,14 +93,25 @@ def _written(scene: Scene, options: Options) -> Written:
     if limit is None:
         return _drawing(scene, options.svg_profile, DETAILS[0])
     size = 0
-    blurs = options.svg_profile != PORTABLE and scene.compositing == "over"
-    for detail in DETAILS if blurs else [detail for detail in DETAILS if not detail.lean]:
+    for detail in _details(scene, options):
         written = _drawing(scene, options.svg_profile, detail)
         size = len(written.document.text(title).encode())
         if size <= limit:
             coarser = () if detail is DETAILS[0] else (_coarser(detail, limit),)
             return Written(written.document, written.notes + coarser)
     raise Sdf2vecError(f"svg: {size:,} bytes at least, more than the limit of {limit:,}; fit fewer shapes")
+
+
+def smallest(scene: Scene, options: Options) -> str:
+    """The smallest drawing of a scene there is."""
+    drawn = _drawing(scene, options.svg_profile, _details(scene, options)[-1])
+    return drawn.document.text(one_line(options.title))
+
+
+def _details(scene: Scene, options: Options) -> list[Detail]:
+    """The details that a drawing may have, finest first."""
+    blurs = options.svg_profile != PORTABLE and scene.compositing == "over"
+    return [detail for detail in DETAILS if blurs or not detail.lean]
 
 
 def _coarser(detail: Detail, limit: int) -> str:
