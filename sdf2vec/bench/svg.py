@@ -30,6 +30,7 @@ from ..scene import Scene
 
 Pixels = NDArray[np.float64]  # [H, W, 4] premultiplied RGBA, 0..1
 
+ALPHA = "alpha: "  # before the names of pictures with alpha
 SMALLEST = "smallest"  # the smallest drawing with filters
 RENDERERS = {
     "filters": ("resvg", "librsvg", "chromium", "firefox"),
@@ -77,7 +78,7 @@ def alpha_pictures(side: int = 384) -> dict[str, NDArray[np.uint8]]:
     hues = np.stack([0.5 + 0.5 * np.sin(6 * x + phase + 4 * y) for phase in (0, 2, 4)], axis=-1)
     return {
         name: np.round(255 * np.concatenate([hues, alpha[..., None]], axis=-1)).astype(np.uint8)
-        for name, alpha in (("alpha: ring", disc), ("alpha: ribbon", ribbon))
+        for name, alpha in ((f"{ALPHA}ring", disc), (f"{ALPHA}ribbon", ribbon))
     }
 
 
@@ -146,7 +147,7 @@ def measured(options: argparse.Namespace) -> Iterator[Row]:
 
 
 def page(found: list[Row], command: str) -> str:
-    """The worst of each renderer over all drawings, then everything."""
+    """The worst of each renderer over all drawings, sizes, then everything."""
     lines = [
         "# SVG against the render: measured",
         "",
@@ -157,7 +158,12 @@ def page(found: list[Row], command: str) -> str:
         "Seconds: wall time at the fitted size on a machine with two busy cores, the start of rsvg-convert and "
         "Firefox included. Chromium draws on the CPU.",
         "",
-        *_worst(found),
+        *(line for shapes in sorted({row.shapes for row in found}) for line in _worst(found, shapes)),
+        "## Bytes",
+        "",
+        *_sizes(found),
+        "",
+        "## Everything",
         "",
         *HEAD,
         *(row.text() for row in found),
@@ -165,18 +171,38 @@ def page(found: list[Row], command: str) -> str:
     return "\n".join(lines) + "\n"
 
 
-def _worst(found: list[Row]) -> Iterator[str]:
-    yield "| profile | renderer | least dB | least dB at twice | mean error | lost to the picture | seconds |"
+def _worst(found: list[Row], shapes: int) -> Iterator[str]:
+    """The worst of each renderer over all pictures and kinds."""
+    yield from (f"## The worst at {shapes} shapes", "")
+    yield "| profile | renderer | least dB | least dB at twice | mean error | lost to the photographs | seconds |"
     yield "|---|---|---:|---:|---:|---:|---:|"
     for profile, renderers in RENDERERS.items():
         for renderer in renderers:
-            own = [row for row in found if (row.profile, row.renderer) == (profile, renderer)]
+            own = [
+                row for row in found if (row.profile, row.renderer, row.shapes) == (profile, renderer, shapes)
+            ]
             if own:
+                photographs = [row.to_picture for row in own if not row.picture.startswith(ALPHA)]
                 yield (
                     f"| {profile} | {renderer} | {min(r.psnr for r in own):.1f} | {min(r.psnr_twice for r in own):.1f} "
-                    f"| {max((r.mean for r in own), key=abs):+.2f} | {min(r.to_picture for r in own):+.2f} "
+                    f"| {max((r.mean for r in own), key=abs):+.2f} | {min(photographs, default=0.0):+.2f} "
                     f"| {max(r.seconds for r in own):.2f} |"
                 )
+    yield ""
+
+
+def _sizes(found: list[Row]) -> Iterator[str]:
+    """The median size, and that gzipped, over all pictures."""
+    yield "| profile | kind | shapes | bytes | gzip |"
+    yield "|---|---|---:|---:|---:|"
+    for profile, kind, shapes in dict.fromkeys((row.profile, row.kind, row.shapes) for row in found):
+        own = {
+            row.picture: row
+            for row in found
+            if (row.profile, row.kind, row.shapes) == (profile, kind, shapes)
+        }
+        size, packed = (int(np.median([row[i] for row in own.values()])) for i in (4, 5))
+        yield f"| {profile} | {kind} | {shapes} | {size:,} | {packed:,} |"
 
 
 def main() -> None:
@@ -196,7 +222,8 @@ def main() -> None:
         f"python -m sdf2vec.bench.svg{names} --shapes {options.shapes} --kinds {options.kinds} "
         f"--preset {options.preset} --seed {options.seed} -o {options.output}"
     )
-    write_atomically(options.output, page(list(measured(options)), command).encode())
+    found = sorted(measured(options), key=lambda row: row.shapes)
+    write_atomically(options.output, page(found, command).encode())
 
 
 if __name__ == "__main__":
