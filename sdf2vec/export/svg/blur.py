@@ -8,7 +8,7 @@ of its own is traced, and its contour moved until the blurred one lies where cov
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
 from typing import NamedTuple
@@ -73,7 +73,7 @@ def best_blur(layer: Layer, size: tuple[float, float, float]) -> Blurred | None:
     trial = trial_of(layer, size)
     shares = [sharpened(outline, share) for share in SHARES]
     best = min(shares, key=lambda tried: trial.blurred(tried, 1.0).error)
-    return min(trial.plain(outline), *(trial.blurred(best, width) for width in WIDTHS), key=_error)
+    return nearest([trial.plain(outline), *(trial.blurred(best, width) for width in WIDTHS)])
 
 
 def _traced(layer: Layer, size: tuple[float, float, float]) -> Blurred | None:
@@ -86,13 +86,13 @@ def _traced(layer: Layer, size: tuple[float, float, float]) -> Blurred | None:
         return None
     steep = max(float(np.sum(edge * np.hypot(down, across)) / edge.sum()), 0.1)  # 1 for a true distance
     tried = (found for width in WIDTHS for found in trial.moved(field / steep, width / steep))
-    return min(
-        *tried, trial.plain(Traced(tuple(contours(field, 0.0, trial.grid))), field / steep), key=_error
-    )
+    return nearest([*tried, trial.plain(Traced(tuple(contours(field, 0.0, trial.grid))), field / steep)])
 
 
-def _error(tried: Blurred) -> float:
-    return tried.error
+def nearest(tried: Sequence[Blurred]) -> Blurred:
+    """The one with the smallest error, its difference in few numbers."""
+    best = min(tried, key=lambda blurred: blurred.error)
+    return best._replace(difference=best.difference.coarse())
 
 
 @dataclass(frozen=True)

@@ -7,6 +7,7 @@ to what it was and within its range.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
 from typing import NamedTuple
@@ -20,7 +21,8 @@ from .weigh import layers_at, small_canvas
 
 SIDE = 128  # pixels along the shortest side of the picture that is solved for
 MOST = 1 << 23  # layers × pixels
-LARGEST = 4096  # layers: more equations than these are not solved
+CELLS = 64  # of a difference that is kept, along its longest side
+LARGEST = 2048  # layers: more equations than these are not solved
 ROUNDS = 3  # of opacities, then colours
 RIDGE = 1e-3  # how much, of a mean layer's weight, the old value counts
 FREEDOM = 0.1  # that an opacity may change by
@@ -32,7 +34,15 @@ class Difference(NamedTuple):
     """Drawn coverage minus the layer's own, [Y, X] on a grid."""
 
     grid: Grid
-    off: Array
+    off: Array | Single
+
+    def coarse(self) -> Difference:
+        """The same by its means over blocks of cells: all that a small canvas needs of it, and little to keep."""
+        block = math.ceil(max(self.off.shape) / CELLS)
+        rows, columns = (size // block * block for size in self.off.shape)
+        blocks = self.off[:rows, :columns].reshape(rows // block, block, columns // block, block)
+        x, y = (axis[: axis.size // block * block].reshape(-1, block).mean(axis=1) for axis in self.grid[:2])
+        return Difference(Grid(x, y, self.grid.step * block), blocks.mean(axis=(1, 3), dtype=np.float32))
 
 
 def compensated(scene: Scene, drawn: Mapping[int, Difference], colors: int = 0, opacities: int = 0) -> Scene:

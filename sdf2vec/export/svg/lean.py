@@ -16,7 +16,7 @@ import numpy as np
 
 from ...scene import Layer
 from ...shapes import EllipseOutline, Outline, PolygonOutline
-from .blur import GAUSSIAN, LEAST, Blurred, best_blur, trial_of
+from .blur import GAUSSIAN, LEAST, Blurred, best_blur, nearest, trial_of
 from .canvas import Canvas, Document, Points, color_text, mean_color, number, tag, url
 from .curves import relative_polygon
 from .field import distances
@@ -72,10 +72,11 @@ def lean_blur(layer: Layer, outline: Outline | None, deviation: float, canvas: C
     trial = trial_of(layer, size)
     if isinstance(outline, EllipseOutline):
         field = distances(layer, trial.grid) - 0.5 * layer.falloff
-        return min((trial.judged(outline, field, tried) for tried in {0.0, deviation}), key=lambda b: b.error)
-    polygons = [(_polygon(outline, tried, canvas), tried) for tried in {0.0, deviation}]
-    found = [trial.judged(polygon, distance_to(polygon, trial.grid), tried) for polygon, tried in polygons]
-    return min(found, key=lambda blurred: blurred.error)
+        return nearest([trial.judged(outline, field, tried) for tried in (0.0, deviation)])
+    polygons = [(_polygon(outline, tried, canvas), tried) for tried in (0.0, deviation)]
+    return nearest(
+        [trial.judged(polygon, distance_to(polygon, trial.grid), tried) for polygon, tried in polygons]
+    )
 
 
 def _polygon(outline: Outline, deviation: float, canvas: Canvas) -> PolygonOutline:

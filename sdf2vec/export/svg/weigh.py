@@ -9,6 +9,7 @@ from .field import Array
 
 SIDE = 128  # pixels along the shortest side of the picture that is weighed
 MOST = 1 << 24  # layers × pixels
+AT_ONCE = 1 << 20  # of them, for a formula holds dozens of numbers for each
 
 
 def contrasts(scene: Scene) -> Array:
@@ -49,8 +50,12 @@ def layers_at(scene: Scene, side: int, most: int = MOST) -> tuple[Array, Array]:
     tensors = from_scene(scene)
     x, y, pixel = reference.canvas(tensors, width, height)
     scale = min(width, height) / min(scene.width, scene.height)
-    covers, colors = reference.layers_at(tensors, x, y, pixel * scale)
-    return covers.double().numpy(), colors.double().numpy()
+    chunk = max(1, AT_ONCE // len(scene.layers))
+    chunks = zip(x.split(chunk), y.split(chunk), strict=True)
+    parts = [reference.layers_at(tensors, own_x, own_y, pixel * scale) for own_x, own_y in chunks]
+    covers = np.concatenate([cover.numpy() for cover, _ in parts], axis=1, dtype=np.float64)
+    colors = [color.double().numpy() for _, color in parts]
+    return covers, colors[0] if colors[0].shape[2] == 1 else np.concatenate(colors, axis=2)
 
 
 def small_canvas(scene: Scene, side: int, most: int = MOST) -> tuple[int, int]:
