@@ -81,6 +81,19 @@ def test_colours_in_steps_make_up_for_each_other():
     assert errors[0] < 0.5 * errors[1]
 
 
+def test_grey_stays_grey():
+    """Channels that differ by less than half a level would be rounded apart, and the rest would make up for it."""
+    r = random.Random(4)
+    layers = []
+    for _ in range(80):
+        grey, place = r.uniform(0, 0.99), (r.uniform(-0.6, 0.6), r.uniform(-0.4, 0.4))
+        color = (grey, grey + r.uniform(0, 1.8e-3), grey + r.uniform(0, 1.8e-3))
+        shape = Shape.of("circle", color, center=place, radius=r.uniform(0.1, 0.3))
+        layers.append(Layer((shape,), 0.1, r.uniform(0.2, 1.0)))
+    chosen = compensated(Scene(120, 80, tuple(layers), (0.5, 0.5, 0.5)), {}, 15, 10)
+    assert all(len(set(layer.shapes[0].color)) == 1 for layer in chosen.layers)
+
+
 def in_steps(layer, count):
     color = tuple(round(count * channel) / count for channel in layer.shapes[0].color)
     return replace(layer, shapes=(replace(layer.shapes[0], color=color),))

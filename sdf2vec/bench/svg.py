@@ -89,12 +89,12 @@ def psnr(drawn: Pixels, wanted: Pixels) -> float:
     return -10 * math.log10(error) if error else math.inf
 
 
-def rows(name: str, scene: Scene, picture: Picture, kind: str) -> Iterator[Row]:
-    """All renderers present, both profiles and the smallest drawing."""
+def rows(name: str, scene: Scene, picture: Picture, kind: str, profiles: list[str]) -> Iterator[Row]:
+    """All renderers present for each profile."""
     width, height = scene.width, scene.height
     once, twice = (_render(scene, factor * width, factor * height) for factor in (1, 2))
     original = _original(picture)
-    for profile in RENDERERS:
+    for profile in profiles:
         text = _text(scene, profile, name)
         sizes = len(text.encode()), len(gzip.compress(text.encode(), 9, mtime=0))
         for renderer in RENDERERS[profile]:
@@ -141,7 +141,7 @@ def measured(options: argparse.Namespace) -> Iterator[Row]:
         for kind in options.kinds.split(","):
             for shapes in map(int, options.shapes.split(",")):
                 scene = api.fit(picture, shapes, kind=kind, preset=options.preset, seed=options.seed)
-                for row in rows(name, scene, picture, kind):
+                for row in rows(name, scene, picture, kind, options.profiles.split(",")):
                     print(row.text(), flush=True)
                     yield row
 
@@ -213,6 +213,7 @@ def main() -> None:
     parser.add_argument("pictures", nargs="*", type=Path)
     parser.add_argument("--shapes", default="64,256", help="numbers, separated by commas")
     parser.add_argument("--kinds", default="circle,ellipse,box,triangle,displaced")
+    parser.add_argument("--profiles", default=",".join(RENDERERS))
     parser.add_argument("--preset", default="balanced")
     parser.add_argument("--seed", type=int, default=0)
     parser.add_argument("-o", "--output", type=Path, required=True)
@@ -220,7 +221,7 @@ def main() -> None:
     names = "".join(f" {path.name}" for path in options.pictures)
     command = (
         f"python -m sdf2vec.bench.svg{names} --shapes {options.shapes} --kinds {options.kinds} "
-        f"--preset {options.preset} --seed {options.seed} -o {options.output}"
+        f"--profiles {options.profiles} --preset {options.preset} --seed {options.seed} -o {options.output}"
     )
     found = sorted(measured(options), key=lambda row: row.shapes)
     write_atomically(options.output, page(found, command).encode())

@@ -25,6 +25,7 @@ CELLS = 64  # of a difference that is kept, along its longest side
 LARGEST = 2048  # layers: more equations than these are not solved
 ROUNDS = 3  # of opacities, then colours
 RIDGE = 1e-3  # how much, of a mean layer's weight, the old value counts
+GREY = 0.5 / 255.0  # channels that differ by less are the same
 FREEDOM = 0.1  # that an opacity may change by
 
 Single = NDArray[np.float32]
@@ -115,7 +116,10 @@ class Stack:
     def _stepped(self, wanted: Array, steps: int) -> Stack:
         """The colours in steps, changed one by one while that brings them nearer."""
         gram, right = self._color_equations(wanted)
-        colors = np.round(self.colors.mean(axis=2)[self.plain] * steps) / steps
+        colors = self.colors.mean(axis=2)[self.plain]
+        if np.ptp(self.first[0], axis=1).max() < GREY:  # stays grey, which each channel by itself would not
+            right, colors = right.mean(axis=1, keepdims=True), colors.mean(axis=1, keepdims=True)
+        colors = np.round(colors * steps) / steps
         for _ in range(20):
             before = colors.copy()
             for i in range(len(colors)):
@@ -123,7 +127,7 @@ class Stack:
                 colors[i] = np.round(np.clip(best, 0.0, 1.0) * steps) / steps
             if np.array_equal(colors, before):
                 break
-        return self._recolored(colors)
+        return self._recolored(np.broadcast_to(colors, (len(colors), 3)))
 
     def with_opacities(self, wanted: Array) -> Stack:
         """The opacities that come nearest to a picture [3 or 4, P], where one layer's change leaves the others'."""

@@ -10,8 +10,8 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from ...blend import REACH, coverage, smooth_union
-from ...expr import VEC2, VEC3, components_of, const, constant, scalarize, var
+from ...blend import REACH, coverage
+from ...expr import components_of, const, constant, scalarize
 from ...scene import Layer
 from ...shapes import KINDS
 from ..constants import constants
@@ -117,14 +117,11 @@ def _evaluate(layer: Layer, grid: Grid, pixel: float, count: int) -> Array:
 @cache
 def _formula(kind: str, union_size: int, count: int) -> Callable[..., tuple[torch.Tensor, ...]]:
     from ...lower.torch import compile_torch
+    from ...render.kernels import Formula, LayerKind
 
-    p, pixel, falloff, smoothness = var("p", VEC2), var("pixel"), var("falloff"), var("smoothness")
-    suffixes = [f"_{i}" for i in range(union_size)]
-    colors = [var(f"color{suffix}", VEC3) for suffix in suffixes]
-    distances = [KINDS[kind].distance(p, *KINDS[kind].variables(suffix)) for suffix in suffixes]
-    distance, color = smooth_union(distances, colors, smoothness)
-    inputs = [*components_of(p), pixel, falloff, smoothness]
-    for suffix, own in zip(suffixes, colors, strict=True):
-        inputs += [*KINDS[kind].scalars(suffix), *components_of(own)]
-    outputs = [distance, coverage(distance, falloff, pixel), *scalarize(color)]
-    return compile_torch(outputs[:count], inputs)
+    formula = Formula(LayerKind(kind, union_size))
+    shapes = zip(formula.parameters, formula.colors, strict=True)
+    numbers = [scalar for row, color in shapes for value in (*row, color) for scalar in components_of(value)]
+    inputs = [*components_of(formula.point), formula.pixel, formula.falloff, formula.smoothness, *numbers]
+    cover = coverage(formula.distance, formula.falloff, formula.pixel)
+    return compile_torch([formula.distance, cover, *scalarize(formula.color)][:count], inputs)
