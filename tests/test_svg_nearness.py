@@ -18,7 +18,7 @@ from sdf2vec.export.svg import svg as write_svg
 from sdf2vec.export.svg.blur import STEPS, trial_of
 from sdf2vec.export.svg.canvas import Canvas
 from sdf2vec.export.svg.compensate import Difference, compensated
-from sdf2vec.export.svg.field import covers, distances, extent, grid_over
+from sdf2vec.export.svg.field import Grid, covers, distances, extent, grid_over
 from sdf2vec.export.svg.outlines import element
 from sdf2vec.image import premultiply
 from sdf2vec.render.reference import render
@@ -56,6 +56,21 @@ def test_an_opacity_makes_up_for_coverage_that_is_too_little():
     (layer,) = compensated(scene, missing).layers
     assert layer.opacity == pytest.approx(0.5 / 0.9, abs=2e-3)
     assert layer.shapes[0].color == pytest.approx((0.2, 0.4, 0.6), abs=2e-3)
+
+
+@pytest.mark.parametrize("shape", [(90, 90), (1, 96), (131, 2), (64, 64), (255, 7)])
+def test_a_difference_in_few_numbers(shape):
+    """A straight slope keeps its values at the places that are kept, however thin the grid is."""
+    rows, columns = shape
+    grid = Grid(np.arange(columns) * 0.5 + 3.0, np.arange(rows) * 0.5 - 1.0, 0.5)
+    slope = grid.x[None, :] + 2.0 * grid.y[:, None]
+    kept, off = Difference(grid, slope).coarse()
+    assert off.shape == (len(kept.y), len(kept.x))
+    assert max(off.shape) <= 64
+    wanted = kept.x[None, :] + 2.0 * kept.y[:, None]
+    block = round(kept.step / grid.step)
+    inner = np.ix_(range(rows // block), range(columns // block))
+    assert np.allclose(off[inner], wanted[inner], atol=1e-4)
 
 
 def test_what_is_drawn_exactly_stays():

@@ -40,10 +40,15 @@ class Difference(NamedTuple):
     def coarse(self) -> Difference:
         """The same by its means over blocks of cells: all that a small canvas needs of it, and little to keep."""
         block = math.ceil(max(self.off.shape) / CELLS)
-        rows, columns = (size // block * block for size in self.off.shape)
-        blocks = self.off[:rows, :columns].reshape(rows // block, block, columns // block, block)
-        x, y = (axis[: axis.size // block * block].reshape(-1, block).mean(axis=1) for axis in self.grid[:2])
-        return Difference(Grid(x, y, self.grid.step * block), blocks.mean(axis=(1, 3), dtype=np.float32))
+        whole = np.pad(self.off, [(0, -size % block) for size in self.off.shape], mode="edge")
+        rows, columns = (size // block for size in whole.shape)
+        means = whole.reshape(rows, block, columns, block).mean(axis=(1, 3), dtype=np.float32)
+        step, middle = self.grid.step, (block - 1) / 2
+        x, y = (
+            axis[0] + (np.arange(count) * block + middle) * step
+            for axis, count in ((self.grid.x, columns), (self.grid.y, rows))
+        )
+        return Difference(Grid(x, y, step * block), means)
 
 
 def compensated(scene: Scene, drawn: Mapping[int, Difference], colors: int = 0, opacities: int = 0) -> Scene:
