@@ -43,7 +43,8 @@ def fit(
     None leaves it to the preset. `seed` (0). `device` ("auto"): also "cpu", "cuda" or "mps". `weights`: a picture
     that is bright where errors matter. `start`: a scene, or its file, to go on from. `palette`: the only colours
     there may be, "#123,#a0b1c2" or tuples 0..1. `colors`: how many there may be. `min_area`: the least area of a
-    shape, a share of the canvas. `trials` (0): how often a few shapes are tried elsewhere at the end.
+    shape, a share of the canvas. `max_falloff`: the softest an edge may be, a share of the shortest side; 0 for sharp
+    shapes. `trials` (0): how often a few shapes are tried elsewhere at the end.
 
     Raises Sdf2vecError for anything that can't be fitted.
     """

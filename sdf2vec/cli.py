@@ -124,6 +124,12 @@ def _add_settings(group: argparse._ArgumentGroup) -> None:
     group.add_argument("--colors", type=int, metavar="K", help="how many colours there may be")
     group.add_argument("--min-area", type=float, metavar="SHARE", help="least area of a shape, of the canvas")
     group.add_argument(
+        "--max-falloff",
+        type=float,
+        metavar="SHARE",
+        help="softest edge, of the shortest side: 0 for sharp shapes",
+    )
+    group.add_argument(
         "--trials", type=int, default=0, metavar="T", help="try a few shapes elsewhere at the end, T times"
     )
 

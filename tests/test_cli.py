@@ -167,9 +167,10 @@ def test_the_options_of_a_fit(folder, run, monkeypatch):
         "mask.png",
     )
     Image.new("L", (5, 5), 255).save(folder / "mask.png")
-    options = ("--palette", "#134,#fa0b1c,#fff", "--min-area", "0.01", "--trials", "1")
+    options = ("--palette", "#134,#fa0b1c,#fff", "--min-area", "0.01", "--max-falloff", "0.02", "--trials", "1")
     assert run("photo.jpg", *common, "--shapes", "4", *options, "-o", "first.json").code == 0
     first = sdf2vec.load(folder / "first.json")
+    assert all(layer.falloff <= 0.02 for layer in first.layers)
     assert [len(layer.shapes) for layer in first.layers] == [2, 2]
     colors = {shape.color for layer in first.layers for shape in layer.shapes} | {first.background}
     levels = {tuple(round(255 * value) for value in color) for color in colors if color}
@@ -295,6 +296,7 @@ def test_same_seed_same_bytes(folder, run):
         (["photo.jpg", "--colors", "few"], ["--colors", "'few'"]),
         (["photo.jpg", "--min-area", "1"], ["least area", "got 1"]),
         (["photo.jpg", "--min-area", "nan"], ["least area", "got nan"]),
+        (["photo.jpg", "--max-falloff", "-1"], ["largest falloff", "got -1"]),
         (["photo.jpg", "--trials", "-1"], ["trials", "got -1"]),
         (["photo.jpg", "--preset", "thesis", "--compositing", "over"], ["thesis", "--compositing additive"]),
         (["photo.jpg", "--shapes", "0"], ["shapes", "got 0"]),

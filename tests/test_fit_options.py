@@ -345,6 +345,26 @@ def test_shapes_grow_to_the_least_area():
     assert smallest(fitted(busy(), 20, min_area=0.06)) > 0.045
 
 
+def falloffs(scene: Scene) -> list[float]:
+    return [layer.falloff for layer in scene.layers]
+
+
+@pytest.mark.parametrize("softest", [0.0, 0.03])
+def test_no_edge_is_softer_than_the_largest_falloff(softest):
+    free = fitted()
+    assert max(falloffs(free)) > 0.1
+    for options in ({}, {"trials": 2}, {"start": free}, {"colors": 2}, {"callback": lambda _: True}):
+        assert max(falloffs(fitted(max_falloff=softest, **options))) <= softest + 1e-6
+
+
+def test_sharp_shapes_learn_where_their_edges_are():
+    y, x = np.mgrid[:64, :64] + 0.5
+    disc = np.clip(18.5 - np.hypot(x - 28, y - 36), 0.0, 1.0).astype(np.float32)
+    begin = Scene(64, 64, (Layer((Shape.of("circle", RED, center=(0, 0), radius=0.2),), 0.0),), (0, 0, 0))
+    (layer,) = fitted(Picture(np.repeat(disc[..., None], 3, 2)), 1, max_falloff=0, start=begin).layers
+    assert np.allclose(layer.shapes[0].parameters, (28 / 64 - 0.5, 36 / 64 - 0.5, 18 / 64), atol=0.01)
+
+
 def test_unions():
     scene = fitted(shapes=6, union=2)
     assert [len(layer.shapes) for layer in scene.layers] == [2, 2, 2]
@@ -414,6 +434,9 @@ def test_the_preset_takes_what_is_set():
     assert preset_of(settings).least_area == 0.01
     assert preset_of(settings_of(preset="thesis")).least_area == 3e-4
     assert preset_of(settings_of(preset="thesis", min_area=0)).least_area == 0
+    assert preset_of(settings_of(preset="thesis", max_falloff=0.5)).falloff == (0.01, 0.5)
+    assert preset_of(settings_of(preset="thesis", max_falloff=0)).falloff == (0, 0)
+    assert preset_of(settings_of(preset="thesis", max_falloff=1.2)).falloff == (0.01, 0.99)
 
 
 def thesis_picture():
@@ -497,6 +520,10 @@ ADDITIVE = Scene(48, 32, (), (0.0, 0.0, 0.0), "additive")
         ({"min_area": 0.11}, "least area .* got 0.11"),
         ({"min_area": float("nan")}, "least area .* got nan"),
         ({"min_area": "much"}, "least area .* got 'much'"),
+        ({"max_falloff": -0.01}, "largest falloff .* between 0 and 1.5, got -0.01"),
+        ({"max_falloff": 1.6}, "largest falloff .* got 1.6"),
+        ({"max_falloff": float("nan")}, "largest falloff .* got nan"),
+        ({"max_falloff": "soft"}, "largest falloff .* got 'soft'"),
         ({"palette": ""}, "#rgb or #rrggbb, got ''"),
         ({"palette": []}, "at least one colour"),
         ({"palette": 3}, "unknown palette 3"),

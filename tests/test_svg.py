@@ -4,6 +4,7 @@ import base64
 import math
 import random
 import re
+from dataclasses import replace
 from xml.etree import ElementTree
 
 import numpy as np
@@ -193,8 +194,13 @@ def test_a_size_limit_is_kept_or_refused():
     assert any("drawn coarser" in note for note in notes(scene, Options(svg_size_limit=free // 2)))
     with pytest.raises(Sdf2vecError, match=r"^svg: [\d,]+ bytes at least, more than the limit of 500"):
         text_of(scene, svg_size_limit=500)
-    with pytest.raises(Sdf2vecError, match=r"bytes at least"):  # without filters it can't be as small
-        text_of(scene, svg_size_limit=40 * 170, svg_profile="portable")
+    with pytest.raises(Sdf2vecError, match=r"bytes at least.*sharp ones \(--max-falloff 0\)"):
+        text_of(scene, svg_size_limit=40 * 170, svg_profile="portable")  # without filters it can't be as small
+    sharp = replace(scene, layers=tuple(replace(layer, falloff=0.0) for layer in scene.layers))
+    small = text_of(sharp, svg_size_limit=40 * 120, svg_profile="portable")
+    assert not re.search(r"<filter|filter:|class=", small)
+    with pytest.raises(Sdf2vecError, match=r"of 500; fit fewer shapes$"):
+        text_of(sharp, svg_size_limit=500)
 
 
 @pytest.mark.parametrize("engine", ["resvg", "cairosvg", "chromium"])
@@ -224,7 +230,7 @@ def test_the_smallest_drawing_still_looks_like_the_render(engine, require_engine
     options = Options(svg_size_limit=24 * 178)
     text = write_svg(scene, options)
     (note,) = notes(scene, options)
-    assert "blurs alone" in note
+    assert "smallest form" in note
     (group,) = (element for element in ElementTree.fromstring(text) if element.tag == f"{NAMESPACE}g")
     assert len(group) == 24
     for size in ((300, 200), (600, 400)):

@@ -27,6 +27,7 @@ DEVICES = ("auto", "cpu", "cuda", "mps")
 MOST_COLORS = 256
 SHAPES = 256  # when nobody says how many
 LARGEST_AREA = 0.1  # share of the canvas
+SOFTEST = 1.5  # scene units
 
 
 @dataclass(frozen=True)
@@ -34,8 +35,8 @@ class Settings:
     """What to fit and how.
 
     `kinds`: names in `shapes.KINDS`; `union`: shapes joined in each layer; `loss`: replaces the preset's, when given;
-    `least_area`: of a shape, in shares of the canvas, None leaves it to the preset; `start`: a scene to go on from,
-    at any size; `trials`: how often a few layers are tried elsewhere at the end; `palette`: the only colours there
+    `least_area`: of a shape, in shares of the canvas, None leaves it to the preset; `softest`: the largest falloff, in
+    scene units, 0 for sharp edges only, None leaves it to the preset; `start`: a scene to go on from, at any size; `trials`: how often a few layers are tried elsewhere at the end; `palette`: the only colours there
     may be; `colors`: how many there may be where no palette is given, 0 for any; `weights`: how much an error
     matters, 0..1, [H, W]; `device`: auto, cpu, cuda or mps.
     """
@@ -49,6 +50,7 @@ class Settings:
     device: str = "auto"
     union: int = 1
     least_area: float | None = None
+    softest: float | None = None
     start: Scene | None = None
     trials: int = 0
     palette: tuple[Color, ...] = ()
@@ -65,6 +67,9 @@ def preset_of(settings: Settings) -> Preset:
         preset = replace(preset, phases=tuple(replace(p, loss=settings.loss) for p in preset.phases))
     if settings.least_area is not None:
         preset = replace(preset, least_area=settings.least_area)
+    if settings.softest is not None:
+        low, high = preset.falloff
+        preset = replace(preset, falloff=(min(low, settings.softest), min(high, settings.softest)))
     return preset
 
 
@@ -79,6 +84,7 @@ def settings_of(
     device: str = "auto",
     union: int = 1,
     min_area: float | None = None,
+    max_falloff: float | None = None,
     start: Any = None,
     trials: int = 0,
     palette: str | Sequence[Color | str] | None = None,
@@ -106,6 +112,7 @@ def settings_of(
         device,
         int(union),
         _area_of(min_area),
+        _softest_of(max_falloff),
         scene,
         int(trials),
         *_colors(palette, colors),
@@ -139,6 +146,17 @@ def _area_of(share: Any) -> float | None:
     except (TypeError, ValueError):
         pass
     raise Sdf2vecError(f"the least area must be a share of the canvas up to {LARGEST_AREA}, got {share!r}")
+
+
+def _softest_of(falloff: Any) -> float | None:
+    try:
+        if falloff is None or 0 <= falloff <= SOFTEST:
+            return falloff if falloff is None else float(falloff)
+    except (TypeError, ValueError):
+        pass
+    raise Sdf2vecError(
+        f"the largest falloff must be a share of the shortest side between 0 and {SOFTEST}, got {falloff!r}"
+    )
 
 
 def _listed(what: str, value: Any) -> list[Any]:

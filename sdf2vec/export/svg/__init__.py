@@ -18,7 +18,7 @@ from ..options import Options
 from .canvas import Canvas, Document, color_text, tag
 from .compensate import compensated
 from .field import extent
-from .layers import Detail, Painter, Part, plan
+from .layers import Detail, Painter, Part, is_soft, plan
 from .lean import COARSE, FINE, GROUP
 from .sums import Term, alternating, terms
 
@@ -99,7 +99,10 @@ def _written(scene: Scene, options: Options) -> Written:
         if size <= limit:
             coarser = () if detail is DETAILS[0] else (_coarser(detail, limit),)
             return Written(written.document, written.notes + coarser)
-    raise Sdf2vecError(f"svg: {size:,} bytes at least, more than the limit of {limit:,}; fit fewer shapes")
+    sharp = "" if _is_sharp(scene) else ", or sharp ones (--max-falloff 0)"
+    raise Sdf2vecError(
+        f"svg: {size:,} bytes at least, more than the limit of {limit:,}; fit fewer shapes{sharp}"
+    )
 
 
 def smallest(scene: Scene, options: Options) -> str:
@@ -110,13 +113,19 @@ def smallest(scene: Scene, options: Options) -> str:
 
 def _details(scene: Scene, options: Options) -> list[Detail]:
     """The details that a drawing may have, finest first."""
-    blurs = options.svg_profile != PORTABLE and scene.compositing == "over"
-    return [detail for detail in DETAILS if blurs or not detail.lean]
+    lean = scene.compositing == "over" and (options.svg_profile != PORTABLE or _is_sharp(scene))
+    return [detail for detail in DETAILS if lean or not detail.lean]
+
+
+def _is_sharp(scene: Scene) -> bool:
+    """Whether no layer needs anything but plain elements."""
+    canvas = Canvas.of(scene)
+    return not any(is_soft(layer, canvas) for layer in scene.layers)
 
 
 def _coarser(detail: Detail, limit: int) -> str:
     if detail.lean:
-        return f"svg: drawn with blurs alone to stay below {limit:,} bytes"
+        return f"svg: drawn in the smallest form to stay below {limit:,} bytes (coarse coordinates, colours, blurs)"
     blurs = f", blurs down to {detail.target:g} dB" if detail.target else ", blurs for all polygons"
     return f"svg: drawn coarser to stay below {limit:,} bytes (edges to {detail.levels:g} levels{blurs})"
 
