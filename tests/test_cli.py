@@ -167,7 +167,16 @@ def test_the_options_of_a_fit(folder, run, monkeypatch):
         "mask.png",
     )
     Image.new("L", (5, 5), 255).save(folder / "mask.png")
-    options = ("--palette", "#134,#fa0b1c,#fff", "--min-area", "0.01", "--max-falloff", "0.02", "--trials", "1")
+    options = (
+        "--palette",
+        "#134,#fa0b1c,#fff",
+        "--min-area",
+        "0.01",
+        "--max-falloff",
+        "0.02",
+        "--trials",
+        "1",
+    )
     assert run("photo.jpg", *common, "--shapes", "4", *options, "-o", "first.json").code == 0
     first = sdf2vec.load(folder / "first.json")
     assert all(layer.falloff <= 0.02 for layer in first.layers)

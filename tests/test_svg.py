@@ -195,7 +195,7 @@ def test_a_size_limit_is_kept_or_refused():
     with pytest.raises(Sdf2vecError, match=r"^svg: [\d,]+ bytes at least, more than the limit of 500"):
         text_of(scene, svg_size_limit=500)
     with pytest.raises(Sdf2vecError, match=r"bytes at least.*sharp ones \(--max-falloff 0\)"):
-        text_of(scene, svg_size_limit=40 * 170, svg_profile="portable")  # without filters it can't be as small
+        text_of(scene, svg_size_limit=40 * 170, svg_profile="portable")
     sharp = replace(scene, layers=tuple(replace(layer, falloff=0.0) for layer in scene.layers))
     small = text_of(sharp, svg_size_limit=40 * 120, svg_profile="portable")
     assert not re.search(r"<filter|filter:|class=", small)

@@ -39,13 +39,15 @@ RENDERERS = {
 }
 HEAD = (
     "| picture | kind | shapes | profile | bytes | gzip | renderer | dB | dB at twice | mean error "
-    "| dB to the picture | seconds |",
-    "|---|---|---:|---|---:|---:|---|---:|---:|---:|---:|---:|",
+    "| dB to the picture | gained | seconds |",
+    "|---|---|---:|---|---:|---:|---|---:|---:|---:|---:|---:|---:|",
 )
 
 
 class Row(NamedTuple):
-    """One drawing in one renderer. `seconds`: wall time at the fitted size, start of a program included."""
+    """One drawing in one renderer. `gained`: dB to the picture more than the render has; `seconds`: wall time at the
+    fitted size, start of a program included.
+    """
 
     picture: str
     kind: str
@@ -58,13 +60,14 @@ class Row(NamedTuple):
     psnr_twice: float
     mean: float
     to_picture: float
+    gained: float
     seconds: float
 
     def text(self) -> str:
         return (
             f"| {self.picture} | {self.kind} | {self.shapes} | {self.profile} | {self.size:,} | {self.packed:,} "
             f"| {self.renderer} | {self.psnr:.1f} | {self.psnr_twice:.1f} | {self.mean:+.2f} "
-            f"| {self.to_picture:+.2f} | {self.seconds:.2f} |"
+            f"| {self.to_picture:.2f} | {self.gained:+.2f} | {self.seconds:.2f} |"
         )
 
 
@@ -104,9 +107,11 @@ def rows(name: str, scene: Scene, picture: Picture, kind: str, profiles: list[st
             drawn = _draw(renderer, text, width, height)
             seconds = time.perf_counter() - started
             larger = _draw(renderer, text, 2 * width, 2 * height)
-            gained = psnr(drawn, original) - psnr(once, original)
-            figures = (psnr(drawn, once), psnr(larger, twice), 255 * float((drawn - once)[..., :3].mean()))
-            yield Row(name, kind, scene.shape_count, profile, *sizes, renderer, *figures, gained, seconds)
+            near = (psnr(drawn, once), psnr(larger, twice), 255 * float((drawn - once)[..., :3].mean()))
+            to_picture = psnr(drawn, original)
+            gained = to_picture - psnr(once, original)
+            figures = (*near, to_picture, gained, seconds)
+            yield Row(name, kind, scene.shape_count, profile, *sizes, renderer, *figures)
 
 
 def _text(scene: Scene, profile: str, name: str) -> str:
@@ -140,7 +145,8 @@ def measured(options: argparse.Namespace) -> Iterator[Row]:
     for name, picture in pictures.items():
         for kind in options.kinds.split(","):
             for shapes in map(int, options.shapes.split(",")):
-                scene = api.fit(picture, shapes, kind=kind, preset=options.preset, seed=options.seed)
+                fitting = {"preset": options.preset, "seed": options.seed, "max_falloff": options.max_falloff}
+                scene = api.fit(picture, shapes, kind=kind, **fitting)
                 for row in rows(name, scene, picture, kind, options.profiles.split(",")):
                     print(row.text(), flush=True)
                     yield row
@@ -154,7 +160,7 @@ def page(found: list[Row], command: str) -> str:
         f"    {command}",
         "",
         "dB: PSNR against the torch render at the fitted size, and at twice that. Mean error: signed, in 8-bit levels. "
-        "dB to the picture: what the drawing loses (−) or gains against the original, compared with the render. "
+        "dB to the picture: PSNR against the original; gained: by how much more than the render's. "
         "Seconds: wall time at the fitted size on a machine with two busy cores, the start of rsvg-convert and "
         "Firefox included. Chromium draws on the CPU.",
         "",
@@ -182,7 +188,7 @@ def _worst(found: list[Row], shapes: int) -> Iterator[str]:
                 row for row in found if (row.profile, row.renderer, row.shapes) == (profile, renderer, shapes)
             ]
             if own:
-                photographs = [row.to_picture for row in own if not row.picture.startswith(ALPHA)]
+                photographs = [row.gained for row in own if not row.picture.startswith(ALPHA)]
                 yield (
                     f"| {profile} | {renderer} | {min(r.psnr for r in own):.1f} | {min(r.psnr_twice for r in own):.1f} "
                     f"| {max((r.mean for r in own), key=abs):+.2f} | {min(photographs, default=0.0):+.2f} "
@@ -215,13 +221,15 @@ def main() -> None:
     parser.add_argument("--kinds", default="circle,ellipse,box,triangle,displaced")
     parser.add_argument("--profiles", default=",".join(RENDERERS))
     parser.add_argument("--preset", default="balanced")
+    parser.add_argument("--max-falloff", type=float, help="softest edge that a shape may have")
     parser.add_argument("--seed", type=int, default=0)
     parser.add_argument("-o", "--output", type=Path, required=True)
     options = parser.parse_args()
     names = "".join(f" {path.name}" for path in options.pictures)
+    softest = "" if options.max_falloff is None else f" --max-falloff {options.max_falloff:g}"
     command = (
         f"python -m sdf2vec.bench.svg{names} --shapes {options.shapes} --kinds {options.kinds} "
-        f"--profiles {options.profiles} --preset {options.preset} --seed {options.seed} -o {options.output}"
+        f"--profiles {options.profiles} --preset {options.preset} --seed {options.seed}{softest} -o {options.output}"
     )
     found = sorted(measured(options), key=lambda row: row.shapes)
     write_atomically(options.output, page(found, command).encode())

@@ -36,9 +36,10 @@ class Settings:
 
     `kinds`: names in `shapes.KINDS`; `union`: shapes joined in each layer; `loss`: replaces the preset's, when given;
     `least_area`: of a shape, in shares of the canvas, None leaves it to the preset; `softest`: the largest falloff, in
-    scene units, 0 for sharp edges only, None leaves it to the preset; `start`: a scene to go on from, at any size; `trials`: how often a few layers are tried elsewhere at the end; `palette`: the only colours there
-    may be; `colors`: how many there may be where no palette is given, 0 for any; `weights`: how much an error
-    matters, 0..1, [H, W]; `device`: auto, cpu, cuda or mps.
+    scene units, 0 for sharp edges only, None leaves it to the preset; `start`: a scene to go on from, at any size;
+    `trials`: how often a few layers are tried elsewhere at the end; `palette`: the only colours there may be; `colors`:
+    how many there may be where no palette is given, 0 for any; `weights`: how much an error matters, 0..1, [H, W];
+    `device`: auto, cpu, cuda or mps.
     """
 
     shapes: int = 256

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from ...scene import Layer, Scene
 from .field import Array, Grid
-from .weigh import layers_at, small_canvas
+from .weigh import layers_at, showing, small_canvas, steps_over
 
 SIDE = 128  # pixels along the shortest side of the picture that is solved for
 MOST = 1 << 23  # layers × pixels
@@ -87,12 +87,16 @@ class Stack:
     def alphas(self) -> Single:
         return np.asarray(self.covers * self.opacities[:, None].astype(np.float32))
 
+    @property
+    def single_colors(self) -> Array:
+        """The colours of the layers that have a single one, [M, 3]."""
+        return np.asarray(self.colors.mean(axis=2)[self.plain])
+
     def shown(self) -> tuple[Single, Single]:
         """How much of each layer shows through those above it [N, P], and of the ground [P]."""
-        through = 1.0 - self.alphas
-        hidden = np.ones_like(through)
-        hidden[:-1] = np.cumprod(through[:0:-1], axis=0)[::-1]
-        return hidden, hidden[0] * through[0]
+        alphas = self.alphas
+        hidden = showing(alphas)
+        return hidden, hidden[0] * (1.0 - alphas[0])
 
     def picture(self) -> Array:
         """Premultiplied colour and, without a ground, alpha [3 or 4, P]."""
@@ -121,7 +125,7 @@ class Stack:
     def _stepped(self, wanted: Array, steps: int) -> Stack:
         """The colours in steps, changed one by one while that brings them nearer."""
         gram, right = self._color_equations(wanted)
-        colors = self.colors.mean(axis=2)[self.plain]
+        colors = self.single_colors
         if np.ptp(self.first[0], axis=1).max() < GREY:  # stays grey, which each channel by itself would not
             right, colors = right.mean(axis=1, keepdims=True), colors.mean(axis=1, keepdims=True)
         colors = np.round(colors * steps) / steps
@@ -139,14 +143,9 @@ class Stack:
         slopes = np.stack([slope.astype(np.float32).ravel() for slope in self._slopes()])
         off = (wanted - self.picture()).astype(np.float32).ravel()
         first = self.first[1]
-        gram, ridge = _ridged(slopes)
-        right = (
-            (slopes @ off).astype(np.float64)
-            + ridge * first
-            + (gram - ridge * np.eye(len(gram))) @ self.opacities
-        )
+        gram, right = _equations(slopes, off[:, None], self.opacities[:, None], first[:, None])
         low, high = np.maximum(first - FREEDOM, 0.0), np.minimum(first + FREEDOM, 1.0)
-        return replace(self, opacities=_bounded(gram, right[:, None], low[:, None], high[:, None])[:, 0])
+        return replace(self, opacities=_bounded(gram, right, low[:, None], high[:, None])[:, 0])
 
     def painted(self, scene: Scene) -> Scene:
         """The scene with this stack's colours and opacities."""
@@ -159,25 +158,17 @@ class Stack:
 
     def _slopes(self) -> Iterator[Array]:
         """For each layer the change of the picture [3 or 4, P] with its opacity."""
-        hidden, _ = self.shown()
-        below = np.zeros((4, self.covers.shape[1]))
-        if self.ground is not None:
-            below += np.array([*self.ground, 1.0])[:, None]
         channels = 4 if self.ground is None else 3
-        for cover, alpha, color, through in zip(self.covers, self.alphas, self.colors, hidden, strict=True):
-            own = np.concatenate([np.broadcast_to(color, (3, len(cover))), np.ones((1, len(cover)))])
-            yield ((own - below) * (cover * through))[:channels]
-            below = below + (own - below) * alpha
+        alphas = self.alphas
+        steps = steps_over(alphas, self.colors, self.ground)
+        for step, share in zip(steps, self.covers * showing(alphas), strict=True):
+            yield (step * share)[:channels]
 
     def _color_equations(self, wanted: Array) -> tuple[Array, Array]:
         """Gram matrix and right side of the least squares for the single colours."""
         weights = (self.shown()[0] * self.alphas)[self.plain]
-        own = self.colors.mean(axis=2)[self.plain]
         off = (wanted - self.picture())[:3].astype(np.float32)
-        gram, ridge = _ridged(weights)
-        first = self.first[0].mean(axis=2)[self.plain]
-        plain = gram - ridge * np.eye(len(gram))
-        return gram, (weights @ off.T).astype(np.float64) + plain @ own + ridge * first
+        return _equations(weights, off.T, self.single_colors, self.first[0].mean(axis=2)[self.plain])
 
     def _recolored(self, solved: Array) -> Stack:
         colors = self.colors.copy()
@@ -214,11 +205,16 @@ def _add(difference: Difference, x: Array, y: Array, cover: Single) -> None:
         cover[np.ix_(rows, columns)] += map_coordinates(off, places, order=1, mode="nearest")
 
 
-def _ridged(rows: Single) -> tuple[Array, float]:
-    """The Gram matrix of rows [N, M] with a ridge, and the ridge."""
-    gram = (rows @ rows.T).astype(np.float64)
+def _equations(slopes: Single, off: Single, now: Array, first: Array) -> tuple[Array, Array]:
+    """Gram matrix [N, N] and right side [N, K] of the least squares for values that are `now` [N, K].
+
+    `slopes` [N, M]: how the picture changes with each; `off` [M, K]: how far the picture is from the wanted one. A
+    ridge keeps values near to what they were at `first` [N, K].
+    """
+    gram = (slopes @ slopes.T).astype(np.float64)
     ridge = RIDGE * float(np.trace(gram)) / len(gram) + 1e-12 if len(gram) else 0.0
-    return gram + ridge * np.eye(len(gram)), ridge
+    right = (slopes @ off).astype(np.float64) + gram @ now + ridge * first
+    return gram + ridge * np.eye(len(gram)), right
 
 
 def _bounded(gram: Array, right: Array, low: Array, high: Array) -> Array:

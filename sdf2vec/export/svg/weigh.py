@@ -2,10 +2,16 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from typing import TypeVar
+
 import numpy as np
+from numpy.typing import NDArray
 
 from ...scene import Scene
 from .field import Array
+
+Float = TypeVar("Float", np.float32, np.float64)
 
 SIDE = 128  # pixels along the shortest side of the picture that is weighed
 MOST = 1 << 24  # layers × pixels
@@ -25,20 +31,35 @@ def contrasts(scene: Scene) -> Array:
         return np.asarray(np.sum(soft * change, axis=1) / soft.sum(axis=1))
     opacity = np.array([layer.opacity for layer in scene.layers])[:, None]
     alphas = covers * opacity
+    through = showing(alphas) * opacity
+    ground = None if scene.background is None else np.array(scene.background)
+    found = np.empty(len(covers))
+    for i, step in enumerate(steps_over(alphas, colors, ground)):
+        change = np.square(step)
+        shown = change[:3].mean(axis=0) + (change[3] if ground is None else 0.0)
+        found[i] = np.sum(soft[i] * shown * np.square(through[i])) / soft[i].sum()
+    return found
+
+
+def showing(alphas: NDArray[Float]) -> NDArray[Float]:
+    """[N, P]: how much of each layer shows through those above it, from the alphas [N, P] of all, lowest first."""
     hidden = np.ones_like(alphas)
     hidden[:-1] = np.cumprod(1.0 - alphas[:0:-1], axis=0)[::-1]
-    below = np.zeros((4, covers.shape[1]))
-    if scene.background is not None:
-        below += np.array([*scene.background, 1.0])[:, None]
-    found = np.empty(len(covers))
-    for i, alpha in enumerate(alphas):
-        own = np.concatenate([np.broadcast_to(colors[i], (3, len(alpha))), np.ones((1, len(alpha)))])
-        change = np.square(own - below)
-        shown = change[:3].mean(axis=0) + (change[3] if scene.background is None else 0.0)
-        shown = shown * np.square(hidden[i] * opacity[i])
-        found[i] = np.sum(soft[i] * shown) / soft[i].sum()
-        below = below + (own - below) * alpha
-    return found
+    return hidden
+
+
+def steps_over(alphas: NDArray[Float], colors: Array, ground: Array | None) -> Iterator[Array]:
+    """For each layer, lowest first, its opaque colour minus what lies below it, premultiplied RGBA [4, P].
+
+    `alphas` [N, P], `colors` [N, 3, P or 1], `ground` [3] or None for a transparent one.
+    """
+    below = np.zeros((4, alphas.shape[1]))
+    if ground is not None:
+        below += np.append(ground, 1.0)[:, None]
+    for alpha, color in zip(alphas, colors, strict=True):
+        own = np.concatenate([np.broadcast_to(color, (3, len(alpha))), np.ones((1, len(alpha)))])
+        yield (step := own - below)
+        below = below + step * alpha
 
 
 def layers_at(scene: Scene, side: int, most: int = MOST) -> tuple[Array, Array]:
