@@ -520,7 +520,7 @@ ADDITIVE = Scene(48, 32, (), (0.0, 0.0, 0.0), "additive")
         ({"min_area": 0.11}, "least area .* got 0.11"),
         ({"min_area": float("nan")}, "least area .* got nan"),
         ({"min_area": "much"}, "least area .* got 'much'"),
-        ({"max_falloff": -0.01}, "largest falloff .* between 0 and 1.5, got -0.01"),
+        ({"max_falloff": -0.01}, "largest falloff .* up to 1.5, got -0.01"),
         ({"max_falloff": 1.6}, "largest falloff .* got 1.6"),
         ({"max_falloff": float("nan")}, "largest falloff .* got nan"),
         ({"max_falloff": "soft"}, "largest falloff .* got 'soft'"),

@@ -8,14 +8,11 @@ from typing import Any, NamedTuple
 
 import numpy as np
 import torch
-from numpy.typing import NDArray
-from torch.autograd.function import once_differentiable
 
 from .. import flip as paper
 from ..render import compiled
 from ..render.fused import in_threads_each
-
-Floats = NDArray[np.float32]
+from .written import Floats, WrittenLoss
 
 ROWS = 16  # that one thread computes at a time
 
@@ -54,7 +51,7 @@ def numbers() -> Numbers:
     return Numbers(*map(np.float32, values))
 
 
-class Flip:
+class Flip(WrittenLoss):
     """Mean FLIP against a fixed target, [3, H, W] or [4, H, W] premultiplied; how the target looks is kept."""
 
     def __init__(self, target: torch.Tensor) -> None:
@@ -71,10 +68,6 @@ class Flip:
         self.matrices = filters.to_rgb.numpy(), filters.to_xyz.numpy()
         planes = np.empty((len(filters.down), *target.shape[1:]), np.float32)
         self.planes, self.seeds = planes, np.empty_like(planes)  # scratch, kept: fresh memory costs more
-
-    def __call__(self, render: torch.Tensor) -> torch.Tensor:
-        value: torch.Tensor = _Function.apply(self, render)
-        return value
 
     def value_and_gradient(self, render: Floats) -> tuple[float, Floats]:
         """Mean FLIP over the grounds and pixels, and its derivative by the render."""
@@ -102,16 +95,3 @@ class Flip:
         )
         each(self.kernels.carry_back, self.seeds, to_planes, across, down, slopes, grad)
         return total, grad
-
-
-class _Function(torch.autograd.Function):
-    @staticmethod
-    def forward(ctx: Any, loss: Flip, render: torch.Tensor) -> torch.Tensor:
-        pixels = np.ascontiguousarray(render.detach().numpy(), dtype=np.float32)
-        value, ctx.gradient = loss.value_and_gradient(pixels)
-        return torch.tensor(value, dtype=torch.float32)
-
-    @staticmethod
-    @once_differentiable
-    def backward(ctx: Any, seed: torch.Tensor) -> tuple[None, torch.Tensor]:
-        return None, torch.from_numpy(ctx.gradient) * seed

@@ -112,8 +112,8 @@ def settings_of(
         int(seed),
         device,
         int(union),
-        _area_of(min_area),
-        _softest_of(max_falloff),
+        _share_of(min_area, "least area", "canvas", LARGEST_AREA),
+        _share_of(max_falloff, "largest falloff", "shortest side", SOFTEST),
         scene,
         int(trials),
         *_colors(palette, colors),
@@ -140,24 +140,14 @@ def _count_of(shapes: int | None, start: Scene | None) -> int:
     return int(shapes)
 
 
-def _area_of(share: Any) -> float | None:
+def _share_of(value: Any, what: str, whole: str, most: float) -> float | None:
+    """A share of something, None for None. Raises Sdf2vecError for what is out of range or no number."""
     try:
-        if share is None or 0 <= share <= LARGEST_AREA:
-            return share if share is None else float(share)
+        if value is None or 0 <= value <= most:
+            return value if value is None else float(value)
     except (TypeError, ValueError):
         pass
-    raise Sdf2vecError(f"the least area must be a share of the canvas up to {LARGEST_AREA}, got {share!r}")
-
-
-def _softest_of(falloff: Any) -> float | None:
-    try:
-        if falloff is None or 0 <= falloff <= SOFTEST:
-            return falloff if falloff is None else float(falloff)
-    except (TypeError, ValueError):
-        pass
-    raise Sdf2vecError(
-        f"the largest falloff must be a share of the shortest side between 0 and {SOFTEST}, got {falloff!r}"
-    )
+    raise Sdf2vecError(f"the {what} must be a share of the {whole} up to {most}, got {value!r}")
 
 
 def _listed(what: str, value: Any) -> list[Any]:

@@ -3,21 +3,17 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import torch
-from numpy.typing import NDArray
-from torch.autograd.function import once_differentiable
 
 from ..metrics import gaussian_window
 from ..render import compiled
 from ..render.fused import in_threads_each
+from .written import Floats, WrittenLoss
 
-Floats = NDArray[np.float32]
 
-
-class Dissimilarity:
+class Dissimilarity(WrittenLoss):
     """1 − SSIM against a fixed target, [C, H, W]; its local means are computed once."""
 
     def __init__(self, target: torch.Tensor) -> None:
@@ -34,10 +30,6 @@ class Dissimilarity:
             [self.kernels.local_means(channel * channel, self.across, self.down) for channel in self.target]
         )
 
-    def __call__(self, render: torch.Tensor) -> torch.Tensor:
-        value: torch.Tensor = _Function.apply(self, render)
-        return value
-
     def value_and_gradient(self, render: Floats) -> tuple[float, Floats]:
         """1 − SSIM and its derivative by the render."""
         grad = np.empty_like(render)
@@ -52,16 +44,3 @@ class Dissimilarity:
         total = sum(in_threads_each(channel, range(len(render))))
         grad *= np.float32(-1.0 / self.mean.size)
         return 1.0 - total / self.mean.size, grad
-
-
-class _Function(torch.autograd.Function):
-    @staticmethod
-    def forward(ctx: Any, loss: Dissimilarity, render: torch.Tensor) -> torch.Tensor:
-        pixels = np.ascontiguousarray(render.detach().numpy(), dtype=np.float32)
-        value, ctx.gradient = loss.value_and_gradient(pixels)
-        return torch.tensor(value, dtype=torch.float32)
-
-    @staticmethod
-    @once_differentiable
-    def backward(ctx: Any, seed: torch.Tensor) -> tuple[None, torch.Tensor]:
-        return None, torch.from_numpy(ctx.gradient) * seed
