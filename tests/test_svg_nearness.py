@@ -11,9 +11,10 @@ import numpy as np
 import pytest
 import torch
 
-from sdf2vec import Layer, Scene, Shape
+from sdf2vec import Layer, Scene, Sdf2vecError, Shape
 from sdf2vec.engines import ENGINES
 from sdf2vec.export.options import Options
+from sdf2vec.export.svg import smallest
 from sdf2vec.export.svg import svg as write_svg
 from sdf2vec.export.svg.blur import STEPS, trial_of
 from sdf2vec.export.svg.canvas import Canvas
@@ -23,6 +24,8 @@ from sdf2vec.export.svg.outlines import element
 from sdf2vec.image import premultiply
 from sdf2vec.render.reference import render
 from sdf2vec.shapes import PolygonOutline
+
+from .scenes import random_shape
 
 Numbers = dict[str, float | tuple[float, ...]]
 NAMESPACE = "{http://www.w3.org/2000/svg}"
@@ -261,3 +264,27 @@ def test_the_smallest_drawing_says_a_triangle_in_few_bytes():
         assert len(path.get("opacity", ".1")) == 2
         assert "." not in path.get("d", ".")
     assert len(gzip.compress(text.encode(), 9)) <= 4700
+
+
+@pytest.mark.parametrize("softest", [0.0, 0.15])
+def test_a_tighter_limit_takes_no_more_from_the_picture_than_it_must(softest, require_engine):
+    """From drawing to drawing, each a byte too large for the next limit: smaller and less near, by few dB a step."""
+    require_engine("resvg")
+    r = random.Random(9)
+    layers = tuple(
+        Layer((random_shape(("triangle", "ellipse", "box")[i % 3], r),), r.uniform(0.2, 1.0) * softest, 0.8)
+        for i in range(48)
+    )
+    scene = Scene(240, 180, layers, (0.5, 0.5, 0.5))
+    wanted = render(scene, 480, 360).permute(1, 2, 0).numpy()
+    least = smallest(scene, Options())
+    texts = [write_svg(scene, Options())]
+    while texts[-1] != least:
+        texts.append(write_svg(scene, Options(svg_size_limit=len(texts[-1].encode()) - 1)))
+    found = [-10 * np.log10(np.mean((ENGINES["resvg"].render(t, 480, 360) - wanted) ** 2)) for t in texts]
+    steps = -np.diff(found)
+    assert len(steps) >= 5
+    assert steps.min() > -1.0, found
+    assert steps.max() < 8.0, found
+    with pytest.raises(Sdf2vecError, match="bytes at least"):
+        write_svg(scene, Options(svg_size_limit=len(least.encode()) - 1))

@@ -19,7 +19,7 @@ from .canvas import Canvas, Document, color_text, tag
 from .compensate import compensated
 from .field import extent
 from .layers import Detail, Painter, Part, is_soft, plan
-from .lean import COARSE, FINE, GROUP
+from .lean import GRAINS, GROUP
 from .sums import Term, alternating, terms
 
 PORTABLE = "portable"
@@ -35,8 +35,7 @@ DETAILS = (
     Detail(target=34.0, levels=1.2, coarser=1),
     Detail(target=30.0, levels=2.0, coarser=1, named=False),
     Detail(target=0.0, levels=4.0, coarser=1, named=False),
-    Detail(target=0.0, levels=4.0, named=False, lean=FINE),
-    Detail(target=0.0, levels=4.0, named=False, lean=COARSE),
+    *(Detail(target=0.0, levels=4.0, named=False, lean=grain) for grain in GRAINS),
 )
 
 

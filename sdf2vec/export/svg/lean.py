@@ -40,8 +40,12 @@ class Grain(NamedTuple):
     margins: tuple[float, ...]
 
 
-FINE = Grain(512, 20, 255, 100, (0.4, 1.0, 2.0, 5.0, 20.0, 100.0))
-COARSE = Grain(160, 6, 15, 10, (1.0, 5.0, 30.0))
+GRAINS = (
+    Grain(512, 20, 255, 100, (0.4, 1.0, 2.0, 5.0, 20.0, 100.0)),
+    Grain(512, 10, 15, 10, (0.4, 1.0, 2.0, 5.0, 30.0)),
+    Grain(256, 10, 15, 10, (1.0, 2.0, 5.0, 30.0)),
+    Grain(160, 6, 15, 10, (1.0, 5.0, 30.0)),
+)
 
 
 def softnesses(falloffs: Sequence[float], canvas: Canvas, count: int) -> list[float]:
