@@ -79,6 +79,41 @@ def test_a_difference_in_few_numbers(shape):
 def test_what_is_drawn_exactly_stays():
     scene = Scene(120, 80, (disc(), disc(0.3)), (0.1, 0.2, 0.3))
     assert compensated(scene, {}) == scene
+    grid = grid_over(extent(scene.layers[0]), 0.01)
+    nothing = Difference(grid, np.zeros((len(grid.y), len(grid.x))))
+    for before, after in zip(scene.layers, compensated(scene, {0: nothing, 1: nothing}).layers, strict=True):
+        assert after.opacity == pytest.approx(before.opacity, abs=1e-4)
+        assert after.shapes[0].color == pytest.approx(before.shapes[0].color, abs=1e-4)
+
+
+def test_an_opacity_makes_up_for_what_8_bits_cut_off():
+    """A tenth of 255 is 25.5 levels, of which 25 are left: it has to be 2 % more."""
+    whole = Shape.of("circle", (0.2, 0.4, 0.6), center=(0, 0), radius=3.0)
+    scene = Scene(120, 80, (Layer((whole,), 0.0, 0.1),), None)
+    (layer,) = compensated(scene, {}, cut=[0]).layers
+    assert layer.opacity == pytest.approx(0.1 * 25.5 / 25, abs=1e-5)
+
+
+@pytest.mark.parametrize("profile", ["filters", "portable"])
+@pytest.mark.parametrize("engine", ["resvg", "librsvg", "chromium", "firefox"])
+def test_faint_layers_add_up(engine, profile, require_engine):
+    """Of a layer with an opacity of 0.05, 8 bits lose most of the edge: of a hundred that is much."""
+    require_engine(engine)
+    r = random.Random(6)
+    layers = []
+    for _ in range(100):
+        look: Numbers = {
+            "center": (r.uniform(-0.1, 0.1), r.uniform(-0.1, 0.1)),
+            "radius": r.uniform(0.15, 0.25),
+            "amplitude": 0.02,
+            "frequency": (r.uniform(9.0, 20.0), r.uniform(9.0, 20.0)),
+        }
+        layers.append(Layer((Shape.of("displaced", (0.9, 0.6, 0.3), **look),), r.uniform(0.2, 0.4), 0.05))
+    scene = Scene(160, 160, tuple(layers), None)
+    for size in (None, (240, 240), (200, 160)):
+        off = off_in(engine, scene, size, svg_profile=profile)
+        assert decibels(off) >= (36 if profile == "filters" else 31.5)
+        assert abs(off[..., 3].mean()) <= 3.0 / 255
 
 
 def test_colours_in_steps_make_up_for_each_other():
@@ -90,7 +125,7 @@ def test_colours_in_steps_make_up_for_each_other():
         place = (r.uniform(-0.6, 0.6), r.uniform(-0.4, 0.4))
         layers.append(Layer((Shape.of("circle", color, center=place, radius=r.uniform(0.1, 0.3)),), 0.1, 0.5))
     scene = Scene(120, 80, tuple(layers), (0.5, 0.5, 0.5))
-    chosen = compensated(scene, {}, 15, 10)
+    chosen = compensated(scene, {}, (), 15, 10)
     steps = np.array([layer.shapes[0].color for layer in chosen.layers]) * 15
     assert np.allclose(steps, np.round(steps), atol=1e-3)
     nearest = replace(scene, layers=tuple(in_steps(layer, 15) for layer in scene.layers))
@@ -108,7 +143,7 @@ def test_grey_stays_grey():
         color = (grey, grey + r.uniform(0, 1.8e-3), grey + r.uniform(0, 1.8e-3))
         shape = Shape.of("circle", color, center=place, radius=r.uniform(0.1, 0.3))
         layers.append(Layer((shape,), 0.1, r.uniform(0.2, 1.0)))
-    chosen = compensated(Scene(120, 80, tuple(layers), (0.5, 0.5, 0.5)), {}, 15, 10)
+    chosen = compensated(Scene(120, 80, tuple(layers), (0.5, 0.5, 0.5)), {}, (), 15, 10)
     assert all(len(set(layer.shapes[0].color)) == 1 for layer in chosen.layers)
 
 

@@ -18,7 +18,7 @@ from ..options import Options
 from .canvas import Canvas, Document, color_text, tag
 from .compensate import compensated
 from .field import extent
-from .layers import Detail, Painter, Part, is_soft, plan
+from .layers import Detail, Painter, Part, is_banded, is_soft, plan
 from .lean import GRAINS, GROUP
 from .sums import Term, alternating, terms
 
@@ -140,7 +140,8 @@ def _drawing(scene: Scene, profile: str, detail: Detail) -> Written:
     planned = plan(scene, document.canvas, detail, profile != PORTABLE)
     if not additive:
         off = {index: blurred.difference for index, blurred in planned.blurred.items()}
-        scene = compensated(scene, off, *((grain.colors, grain.opacities) if grain else ()))
+        cut = [i for i, layer in enumerate(scene.layers) if i in off or is_banded(layer, canvas)]
+        scene = compensated(scene, off, cut, *((grain.colors, grain.opacities) if grain else ()))
     painter = Painter(document, detail, planned)
     if additive:
         found = _add_terms(scene, document, painter)

@@ -1,6 +1,7 @@
 """Colours and opacities solved again against the coverage that the drawing really has.
 
-A blur is only near a layer's coverage, and where many edges lie on each other all are off in the same direction.
+A blur is only near a layer's coverage, and where many edges lie on each other all are off in the same direction; and
+8 bits cut off the faint ends of soft layers, of which many add up.
 Colours are in the picture linearly, and so, nearly, are opacities: each is solved by least squares in turn, near
 to what it was and within its range.
 """
@@ -8,7 +9,7 @@ to what it was and within its range.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import NamedTuple
 
@@ -27,6 +28,9 @@ ROUNDS = 3  # of opacities, then colours
 RIDGE = 1e-3  # how much, of a mean layer's weight, the old value counts
 GREY = 0.5 / 255.0  # channels that differ by less are the same
 FREEDOM = 0.1  # that an opacity may change by
+ROUNDING = (
+    0.2  # added before 8-bit alpha is rounded down: browsers on the CPU do that, others take the nearest
+)
 
 Single = NDArray[np.float32]
 
@@ -51,18 +55,24 @@ class Difference(NamedTuple):
         return Difference(Grid(x, y, step * block), means)
 
 
-def compensated(scene: Scene, drawn: Mapping[int, Difference], colors: int = 0, opacities: int = 0) -> Scene:
+def compensated(
+    scene: Scene,
+    drawn: Mapping[int, Difference],
+    cut: Sequence[int] = (),
+    colors: int = 0,
+    opacities: int = 0,
+) -> Scene:
     """The scene with the colours and opacities whose drawing is nearest to the scene's render.
 
-    `drawn`: what is off about the layers that are not drawn exactly. `colors`, `opacities`: these become whole
-    numbers of so many steps; the colours are chosen together, so that the error of one makes up for another's.
-    0 leaves them free. Only `over`.
+    `drawn`: what is off about the layers that are not drawn exactly. `cut`: layers whose alpha renderers round down
+    to 8 bits. `colors`, `opacities`: these become whole numbers of so many steps; the colours are chosen together,
+    so that the error of one makes up for another's. 0 leaves them free. Only `over`.
     """
-    if not scene.layers or len(scene.layers) > LARGEST or not (drawn or colors):
+    if not scene.layers or len(scene.layers) > LARGEST or not (drawn or cut or colors):
         return scene
-    stack, wanted = _stack(scene, drawn)
+    stack, wanted = _stack(scene, drawn, cut)
     best, least = stack, stack.error(wanted)
-    for _ in range(ROUNDS if drawn else 0):
+    for _ in range(ROUNDS if drawn or cut else 0):
         stack = stack.with_opacities(wanted).with_colors(wanted)
         if (error := stack.error(wanted)) < least:
             best, least = stack, error
@@ -176,7 +186,7 @@ class Stack:
         return replace(self, colors=colors)
 
 
-def _stack(scene: Scene, drawn: Mapping[int, Difference]) -> tuple[Stack, Array]:
+def _stack(scene: Scene, drawn: Mapping[int, Difference], cut: Sequence[int]) -> tuple[Stack, Array]:
     """The scene's layers as they are drawn, and its render, on a small canvas."""
     covers, colors = layers_at(scene, SIDE, MOST)
     ground = None if scene.background is None else np.array(scene.background)
@@ -189,7 +199,11 @@ def _stack(scene: Scene, drawn: Mapping[int, Difference]) -> tuple[Stack, Array]
     off = exact.covers.copy()
     for index, difference in drawn.items():
         _add(difference, x, y, off[index].reshape(height, width))
-    return replace(exact, covers=np.clip(off, 0.0, 1.0)), exact.picture()
+    off = np.clip(off, 0.0, 1.0)
+    for index in cut:
+        levels = 255.0 * max(float(opacities[index]), 1e-6)
+        off[index] = np.floor(off[index] * levels + ROUNDING) / levels
+    return replace(exact, covers=off), exact.picture()
 
 
 def _add(difference: Difference, x: Array, y: Array, cover: Single) -> None:

@@ -203,6 +203,11 @@ def is_soft(layer: Layer, canvas: Canvas) -> bool:
     return layer.falloff * side > SHARP * min(1.0, side / SMALL)
 
 
+def is_banded(layer: Layer, canvas: Canvas) -> bool:
+    """Whether a layer is soft, and no gradient or slices could draw it."""
+    return is_soft(layer, canvas) and edge_of(layer, 0.0) is None
+
+
 def _at_least(share: float) -> int:
     """Per cent, rounded up to one of a few steps."""
     steps = (10, 20, 30, 45, 60, 80, 110, 150, 200, 300, 450, 700, 1000, 2000, 5000)
