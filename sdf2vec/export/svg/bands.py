@@ -21,6 +21,8 @@ SOFTLY = 12  # grid cells in a falloff are enough
 FEWEST = 96  # grid cells along the longest side of a small shape
 MAX_CELLS = 2048  # grid cells along any side
 FEWEST_BANDS, MOST_BANDS = 3, 24
+BANDS_A_PIXEL = 1.4
+SHOWN = 512.0  # pixels along the shortest side, at least, that a drawing is expected to be shown at
 
 
 def seen(layer: Layer, canvas: Canvas) -> Box:
@@ -56,13 +58,14 @@ def band_levels(count: int) -> list[tuple[float, float]]:
     return [(_distance_at(edge), (i + 1) / (count + 1)) for i, edge in enumerate(edges.tolist())]
 
 
-def band_count(contrast: float, levels: float) -> int:
+def band_count(contrast: float, levels: float, width: float = math.inf) -> int:
     """How many bands keep the error of their steps below so many 8-bit levels (root mean square).
 
-    `contrast` is the mean squared change of the picture where coverage goes from 0 to 1.
+    `contrast` is the mean squared change of the picture where coverage goes from 0 to 1. `width`: the falloff in pixels;
+    of a narrow edge more bands than BANDS_A_PIXEL only overlap, and are rounded down once each.
     """
     wanted = 255.0 * contrast**0.5 / (math.sqrt(12.0) * levels) - 1.0
-    return int(min(max(math.ceil(wanted), FEWEST_BANDS), MOST_BANDS))
+    return int(min(max(math.ceil(min(wanted, BANDS_A_PIXEL * width)), FEWEST_BANDS), MOST_BANDS))
 
 
 def _distance_at(cover: float) -> float:

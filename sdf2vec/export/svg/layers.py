@@ -9,7 +9,7 @@ import numpy as np
 
 from ...scene import Layer, Scene
 from ...shapes import KINDS, EllipseOutline, Outline
-from .bands import band_count, band_levels, layer_contours
+from .bands import SHOWN, band_count, band_levels, layer_contours
 from .blur import Blurred, best_blur
 from .canvas import Canvas, Document, Points, color_text, opacity_text, tag, url
 from .curves import path_data, polygon_data
@@ -45,7 +45,7 @@ class Detail:
     `lean`: nothing but blurs, in the smallest text, so coarse.
     """
 
-    target: float = 45.0
+    target: float = 46.0
     levels: float = 0.2
     coarser: int = 0
     named: bool = True
@@ -240,7 +240,11 @@ def plan(scene: Scene, canvas: Canvas, detail: Detail, blurs: bool) -> Plan:
     """The cheapest constructions that keep to what is allowed."""
     weight = contrasts(scene) if scene.layers else np.zeros(0)
     stops = [stop_count(w, detail.levels) for w in weight.tolist()]
-    bands = [band_count(w, BANDS_COARSER * detail.levels) for w in weight.tolist()]
+    side = max(canvas.unit * canvas.pixels, SHOWN)
+    bands = [
+        band_count(w, BANDS_COARSER * detail.levels, layer.falloff * side)
+        for w, layer in zip(weight.tolist(), scene.layers, strict=True)
+    ]
     if detail.lean:
         blurred = _lean_blurs(scene, canvas, detail.lean)
     else:
