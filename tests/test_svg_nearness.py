@@ -273,6 +273,22 @@ def test_bands_leave_no_gaps(engine, profile, require_engine):
         assert abs(off.mean()) <= (0.5 if profile == "filters" else 2.0) / 255
 
 
+@pytest.mark.parametrize("engine", ["resvg", "librsvg", "chromium", "firefox", "cairosvg"])
+@pytest.mark.parametrize("falloff", [3.0, 5.0, 8.0])
+def test_the_bands_of_a_narrow_edge_are_not_too_many(engine, falloff, require_engine):
+    """Two dozen within five pixels lose eleven levels in browsers, and where they overlap they are too dense."""
+    require_engine(engine)
+    look: Numbers = {"center": (0.013, -0.021), "radius": 0.2, "amplitude": 0.004, "frequency": (50.0, 60.0)}
+    shape = Shape.of("displaced", (1.0, 1.0, 1.0), **look)
+    scene = Scene(512, 512, (Layer((shape,), falloff / 512),), (0.0, 0.0, 0.0))
+    wanted = render(scene).permute(1, 2, 0).numpy()[..., 0]
+    edge = (wanted > 0.1) & (wanted < 0.9)
+    off = off_in(engine, scene, svg_profile="portable")[..., 0][edge]
+
+    assert abs(off.mean()) <= 4.0 / 255
+    assert off.std() <= 11.0 / 255
+
+
 # --- the smallest drawing ----------------------------------------------------------------------------------
 
 

@@ -61,8 +61,8 @@ def band_levels(count: int) -> list[tuple[float, float]]:
 def band_count(contrast: float, levels: float, width: float = math.inf) -> int:
     """How many bands keep the error of their steps below so many 8-bit levels (root mean square).
 
-    `contrast` is the mean squared change of the picture where coverage goes from 0 to 1. `width`: the falloff in pixels;
-    of a narrow edge more bands than BANDS_A_PIXEL only overlap, and are rounded down once each.
+    `contrast` is the mean squared change of the picture where coverage goes from 0 to 1. `width`: the falloff in
+    pixels; of a narrow edge more bands than BANDS_A_PIXEL only overlap, and are rounded down once each.
     """
     wanted = 255.0 * contrast**0.5 / (math.sqrt(12.0) * levels) - 1.0
     return int(min(max(math.ceil(min(wanted, BANDS_A_PIXEL * width)), FEWEST_BANDS), MOST_BANDS))
