@@ -23,7 +23,7 @@ from .canvas import Canvas, Document, Points, color_text, number, opacity_text, 
 from .outlines import convex, sides, turn
 from .stops import SOFT, edge_stops, stop_elements
 
-LIFT = -0.25  # 8-bit levels: resvg and Firefox gain half a level at a gradient, the others nothing
+LIFT = -0.3  # 8-bit levels: resvg and Firefox gain half a level at a gradient, the others nothing
 WIDEST = math.radians(60.0)  # of a circular sector drawn as a triangle
 
 

@@ -45,7 +45,7 @@ class Detail:
     `lean`: nothing but blurs, in the smallest text, so coarse.
     """
 
-    target: float = 46.0
+    target: float = 47.0
     levels: float = 0.2
     coarser: int = 0
     named: bool = True
