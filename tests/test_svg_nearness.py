@@ -284,7 +284,6 @@ def test_the_bands_of_a_narrow_edge_are_not_too_many(engine, falloff, require_en
     wanted = render(scene).permute(1, 2, 0).numpy()[..., 0]
     edge = (wanted > 0.1) & (wanted < 0.9)
     off = off_in(engine, scene, svg_profile="portable")[..., 0][edge]
-
     assert abs(off.mean()) <= 4.0 / 255
     assert off.std() <= 11.0 / 255
 

@@ -9,6 +9,7 @@ from typing import Literal
 Loss = tuple[tuple[str, float], ...]  # name in `losses.LOSSES`, weight
 
 MANY = 256  # shapes beyond which the phases' resolution grows
+SOFTEST = 1.5  # falloff of any shape, in scene units
 CROWDING = 0.35  # rates of layers fall with this power of their number
 
 L1: Loss = (("l1", 1.0),)
@@ -78,7 +79,7 @@ class Preset:
     phases: tuple[Phase, ...]
     start: Start = Start()
     compositing: str | None = None
-    falloff: tuple[float, float] = (0.0, 1.5)
+    falloff: tuple[float, float] = (0.0, SOFTEST)
     least_area: float = 0.0
     sharpens: bool = True
     crowding: float = CROWDING

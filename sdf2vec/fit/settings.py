@@ -19,7 +19,7 @@ from ..image import resize
 from ..scene import MAX_SHAPES, MAX_UNION, Color, Scene
 from ..scene import load as load_scene
 from ..shapes import KINDS
-from .presets import DEFAULT, PRESETS, Loss, Preset
+from .presets import DEFAULT, PRESETS, SOFTEST, Loss, Preset
 
 MIXED = "mixed"
 LOSS_NAMES = ("l1", "mse", "ssim", "flip")
@@ -27,7 +27,6 @@ DEVICES = ("auto", "cpu", "cuda", "mps")
 MOST_COLORS = 256
 SHAPES = 256  # when nobody says how many
 LARGEST_AREA = 0.1  # share of the canvas
-SOFTEST = 1.5  # scene units
 
 
 @dataclass(frozen=True)

@@ -22,7 +22,6 @@ FEWEST = 96  # grid cells along the longest side of a small shape
 MAX_CELLS = 2048  # grid cells along any side
 FEWEST_BANDS, MOST_BANDS = 3, 24
 BANDS_A_PIXEL = 1.4
-SHOWN = 512.0  # pixels along the shortest side, at least, that a drawing is expected to be shown at
 
 
 def seen(layer: Layer, canvas: Canvas) -> Box:

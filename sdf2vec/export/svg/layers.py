@@ -9,7 +9,7 @@ import numpy as np
 
 from ...scene import Layer, Scene
 from ...shapes import KINDS, EllipseOutline, Outline
-from .bands import SHOWN, band_count, band_levels, layer_contours
+from .bands import band_count, band_levels, layer_contours
 from .blur import Blurred, best_blur
 from .canvas import Canvas, Document, Points, color_text, opacity_text, tag, url
 from .curves import path_data, polygon_data
@@ -28,6 +28,7 @@ CUT = 4.0  # times as bad as others is the error of what the canvas' edge cuts o
 TRANSPARENT_LIFT = 0.5  # 8-bit levels: on no ground browsers lose half of one at a blur
 BANDS_COARSER = 4.0  # bands are dear, and their steps alternate in sign
 PIECES_COARSER = 8.0  # pieces are still dearer: every shape of a union has bands of its own
+SHOWN = 512.0  # pixels along the shortest side, at least, that a drawing is expected to be shown at
 NARROW = 12.0  # pixels: bands of a softer edge need no antialiasing
 LOOSEST = 1.0  # user units that a contour of a soft edge may be off
 MIXED = 7.5  # by so much more than the stops of an edge may a gradient through a union be off
