@@ -1,4 +1,4 @@
-"""From distances to colours: falloff, smooth union, compositing. And from a pixel to a point of the scene.
+"""From distances to colours: falloff, joins, compositing. And from a pixel to a point of the scene.
 
 Colours are sRGB-coded and blended as such. All formulas are expressions; nothing here computes.
 """
@@ -6,7 +6,8 @@ Colours are sRGB-coded and blended as such. All formulas are expressions; nothin
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable
+from dataclasses import dataclass
 
 from .expr import (
     FLOAT,
@@ -14,6 +15,8 @@ from .expr import (
     VEC3,
     VEC4,
     Expr,
+    Function,
+    absolute,
     clamp,
     const,
     exp,
@@ -23,6 +26,7 @@ from .expr import (
     maximum,
     minimum,
     mix,
+    select,
     sigmoid,
     sin,
     vec4,
@@ -33,6 +37,7 @@ from .expr import (
 STEEPNESS = 10.0  # the thesis' normalised sigmoid: 5 − 10·d/falloff
 CUTOFF = 1.0 / 512.0  # coverage below it counts as 0, above 1 − it as 1: half a level of 8 bits
 MIN_FALLOFF_PIXELS = 1.6  # a logistic edge of this falloff has the variance of a one-pixel box filter
+SHARPEST = 1e-6  # scene units: joins of no smoothness have this one
 REACH = math.log(1.0 / CUTOFF - 1.0) / STEEPNESS  # half the width of the soft edge, in falloffs
 
 
@@ -58,45 +63,67 @@ def reach(falloff: Expr, pixel: Expr) -> Expr:
     return 0.5 * falloff + REACH * _softness(falloff, pixel)
 
 
-# --- smooth union -------------------------------------------------------------------------------------------
+# --- joins --------------------------------------------------------------------------------------------------
+# Of what has been joined so far, `a`, and the next shape, `b`: each a colour and a signed distance, (r, g, b, d).
 
 
-@function("unionWeight", d=FLOAT, nearest=FLOAT, smoothness=FLOAT)
-def union_weight(d: Expr, nearest: Expr, smoothness: Expr) -> Expr:
-    """Weight of one shape in a smooth union, 1 for the nearest."""
-    return exp((nearest - d) / smoothness)
+def _blur(difference: Expr, smoothness: Expr) -> tuple[Expr, Expr]:
+    """The weight of the farther one of two, that of the nearer being 1; and how far a smooth join is from a sharp one.
 
-
-@function("unionDistance", nearest=FLOAT, total=FLOAT, smoothness=FLOAT)
-def union_distance(nearest: Expr, total: Expr, smoothness: Expr) -> Expr:
-    """Exponential smooth minimum from the sum of the weights."""
-    return nearest - smoothness * log(total)
-
-
-def smooth_union(distances: Sequence[Expr], colors: Sequence[Expr], smoothness: Expr) -> tuple[Expr, Expr]:
-    """Distance and colour of shapes joined by the exponential smooth minimum (the thesis' 4.2 to 4.4).
-
-    −k·log Σ exp(−dᵢ/k), shifted by the nearest distance so that nothing overflows; the colour is the mean of
-    the shapes' colours by the same weights. One shape is itself.
+    The logarithm of a sum of exponentials, shifted by the larger so that nothing overflows.
     """
-    if len(distances) == 1:
-        return distances[0], colors[0]
-    named = [let(f"d{i}", d) for i, d in enumerate(distances, 1)]
-    nearest = named[0]
-    for d in named[1:]:
-        nearest = minimum(nearest, d)
-    nearest = let("nearest", nearest)
-    weights = [let(f"w{i}", union_weight(d, nearest, smoothness)) for i, d in enumerate(named, 1)]
-    total, color = weights[0], colors[0] * weights[0]
-    for weight, other in zip(weights[1:], colors[1:], strict=True):
-        total, color = total + weight, color + other * weight
-    total = let("total", total)
-    return union_distance(nearest, total, smoothness), color / total
+    k = let("k", maximum(smoothness, SHARPEST))
+    weight = let("weight", exp(-absolute(difference) / k))
+    return weight, k * log(1.0 + weight)
+
+
+@function("smoothUnion", a=VEC4, b=VEC4, smoothness=FLOAT)
+def smooth_union(a: Expr, b: Expr, smoothness: Expr) -> Expr:
+    """Exponential smooth minimum −k·log(e^(−a/k) + e^(−b/k)); colours are mixed by the same weights."""
+    weight, blur = _blur(a.w - b.w, smoothness)
+    share = select(b.w < a.w, 1.0, weight) / (1.0 + weight)
+    mixed = let("mixed", mix(a, b, share))
+    return vec4(mixed.x, mixed.y, mixed.z, minimum(a.w, b.w) - blur)
+
+
+@function("smoothSubtraction", a=VEC4, b=VEC4, smoothness=FLOAT)
+def smooth_subtraction(a: Expr, b: Expr, smoothness: Expr) -> Expr:
+    """What is in a and not in b, in the colour of a."""
+    _, blur = _blur(a.w + b.w, smoothness)
+    return vec4(a.x, a.y, a.z, maximum(a.w, -b.w) + blur)
+
+
+@function("smoothIntersection", a=VEC4, b=VEC4, smoothness=FLOAT)
+def smooth_intersection(a: Expr, b: Expr, smoothness: Expr) -> Expr:
+    """What is in both, in the colour of a."""
+    _, blur = _blur(a.w - b.w, smoothness)
+    return vec4(a.x, a.y, a.z, maximum(a.w, b.w) + blur)
+
+
+@dataclass(frozen=True)
+class Join:
+    """How a shape is joined to those before it. `adds`: it may make the layer larger, and its colour is seen."""
+
+    name: str
+    symbol: str
+    formula: Function
+    adds: bool = False
+
+
+JOINS: dict[str, Join] = {
+    join.name: join
+    for join in (
+        Join("union", "|", smooth_union, adds=True),
+        Join("subtraction", "-", smooth_subtraction),
+        Join("intersection", "&", smooth_intersection),
+    )
+}
+UNION = "union"
 
 
 def union_reach(count: int, smoothness: Expr) -> Expr:
-    """How much farther than its nearest shape a smooth union of `count` shapes can reach."""
-    return smoothness * math.log(count) if count > 1 else const(0.0)
+    """How much farther than its nearest shape a union of `count` shapes, none smoother than that, can reach."""
+    return maximum(smoothness, SHARPEST) * math.log(count) if count > 1 else const(0.0)
 
 
 # --- compositing --------------------------------------------------------------------------------------------
@@ -114,7 +141,35 @@ def additive(below: Expr, color: Expr, opacity: Expr, cover: Expr) -> Expr:
     return below + vec4(color, opacity) * cover
 
 
-COMPOSITING = {"over": over, "additive": additive}
+@dataclass(frozen=True)
+class Compositing:
+    """How layers come together: `draw(below, color, opacity, cover)` is what a layer makes of what is below it.
+
+    `signed`: colours, opacities and coverage go from −1 to 1, not from 0; coverage below 0 counts as none otherwise.
+    `hides`: an opaque layer hides what is below it, and the order of layers matters. `linear_in`: names of the numbers
+    in which the picture is linear, such that a layer adds nothing where they are all 0.
+    """
+
+    name: str
+    draw: Function
+    signed: bool
+    hides: bool
+    linear_in: tuple[str, ...]
+
+    @property
+    def lowest(self) -> float:
+        """The least that a colour, an opacity or a coverage can be."""
+        return -1.0 if self.signed else 0.0
+
+
+COMPOSITING: dict[str, Compositing] = {
+    compositing.name: compositing
+    for compositing in (
+        Compositing("over", over, signed=False, hides=True, linear_in=("opacity",)),
+        Compositing("additive", additive, signed=True, hides=False, linear_in=("color", "opacity")),
+    )
+}
+OVER = "over"
 
 
 @function("display", color=VEC4)
@@ -127,38 +182,27 @@ def display(color: Expr) -> Expr:
 # --- the canvas ---------------------------------------------------------------------------------------------
 
 
-def _units(resolution: Expr, size: Expr) -> Expr:
-    return let("units", size / resolution)
+def _framing(pick: Callable[[Expr, Expr], Expr], does: str) -> tuple[Function, Function]:
+    """The scene's point at a pixel, and the size of a pixel."""
 
+    def size_of_pixel(resolution: Expr, size: Expr) -> Expr:
+        units = let("units", size / resolution)
+        return pick(units.x, units.y)
 
-@function("pixelSize", resolution=VEC2, size=VEC2)
-def pixel_size(resolution: Expr, size: Expr) -> Expr:
-    """Scene units per pixel such that a scene of this size fits into the canvas."""
-    units = _units(resolution, size)
-    return maximum(units.x, units.y)
+    size_of_pixel.__doc__ = f"Scene units per pixel such that a scene of this size {does} the canvas."
+    pixel_size = function("pixelSize", resolution=VEC2, size=VEC2)(size_of_pixel)
 
+    @function("scenePoint", pixel=VEC2, resolution=VEC2, size=VEC2)
+    def scene_point(pixel: Expr, resolution: Expr, size: Expr) -> Expr:
+        """The scene's point at a pixel position (y down, centres at half-integers); the origin is the middle."""
+        return (pixel - 0.5 * resolution) * pixel_size(resolution, size)
 
-@function("scenePoint", pixel=VEC2, resolution=VEC2, size=VEC2)
-def scene_point(pixel: Expr, resolution: Expr, size: Expr) -> Expr:
-    """The scene's point at a pixel position (y down, centres at half-integers); the origin is the middle."""
-    return (pixel - 0.5 * resolution) * pixel_size(resolution, size)
-
-
-@function("pixelSize", resolution=VEC2, size=VEC2)
-def covering_pixel_size(resolution: Expr, size: Expr) -> Expr:
-    """Scene units per pixel such that a scene of this size covers the canvas."""
-    units = _units(resolution, size)
-    return minimum(units.x, units.y)
-
-
-@function("scenePoint", pixel=VEC2, resolution=VEC2, size=VEC2)
-def covering_scene_point(pixel: Expr, resolution: Expr, size: Expr) -> Expr:
-    """The scene's point at a pixel position (y down, centres at half-integers); the origin is the middle."""
-    return (pixel - 0.5 * resolution) * covering_pixel_size(resolution, size)
+    return scene_point, pixel_size
 
 
 # How a scene meets a canvas of another shape: the point and the size of a pixel.
-FRAMINGS = {"fit": (scene_point, pixel_size), "cover": (covering_scene_point, covering_pixel_size)}
+FRAMINGS = {"fit": _framing(maximum, "fits into"), "cover": _framing(minimum, "covers")}
+scene_point, pixel_size = FRAMINGS["fit"]
 
 
 @function("surfacePoint", uv=VEC2, size=VEC2)

@@ -715,15 +715,15 @@ def _rebuild(node: Expr, args: tuple[Expr, ...]) -> Expr:
     return _node(node.op, args, node.type, node.payload)
 
 
-def hoist(expr: Expr, varying: Expr) -> list[Expr]:
-    """The largest parts of `expr`, constants aside, that do not depend on `varying`, in a fixed order.
+def hoist(expr: Expr, varying: Container[Expr]) -> list[Expr]:
+    """The largest parts of `expr`, constants aside, that do not depend on what is `varying`, in a fixed order.
 
     They can be computed once and replaced by table entries. Calls are looked at from outside only.
     """
     depends: set[Expr] = set()
     candidates: list[Expr] = []
     for node in walk([expr]):
-        if node is varying or any(arg in depends for arg in node.args):
+        if node in varying or any(arg in depends for arg in node.args):
             depends.add(node)
             candidates += [arg for arg in node.args if arg not in depends and arg.op != "const"]
     return list(dict.fromkeys(candidates))

@@ -15,22 +15,24 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
-from .blend import COMPOSITING
+from .blend import COMPOSITING, JOINS, OVER, UNION
 from .errors import Sdf2vecError
 from .files import one_line, write_atomically
-from .shapes import KINDS, LARGEST, Kind, Parameter
+from .layer import Part, Structure
+from .paints import BASE, FLAT, PAINTS, Paint
+from .shapes import KINDS, Kind
+from .units import COLOR_DECIMALS, GEOMETRY_DECIMALS, LONGEST_CANVAS, Parameter
 
 FORMAT = "sdf2vec scene"
-VERSION = 1
+VERSION = 2
 MAX_SHAPES = 65536
-MAX_UNION = 128  # shapes in one layer: each is a term of one formula
+MAX_JOINED = 128  # shapes in one layer: each is a term of one formula
 MAX_SIDE = 65536  # pixels
-GEOMETRY_DECIMALS = 6
-COLOR_DECIMALS = 5
 
 Color = tuple[float, float, float]
+BLACK: Color = (0.0, 0.0, 0.0)
 
 
 class SceneError(Sdf2vecError):
@@ -112,12 +114,13 @@ def _field(name: str) -> str:
 
 
 def _in_range(parameter: Parameter, value: float, path: str) -> None:
-    if parameter.positive and value <= parameter.minimum:
-        raise SceneError(path, f"must be > {parameter.minimum:g}, got {value:g}")
-    if value < parameter.minimum:
-        raise SceneError(path, f"must be >= {parameter.minimum:g}, got {value:g}")
-    if value > parameter.maximum:
-        raise SceneError(path, f"must be <= {parameter.maximum:g}, got {value:g}")
+    low, high = parameter.unit.low, parameter.unit.high
+    if parameter.positive and value <= low:
+        raise SceneError(path, f"must be > {low:g}, got {value:g}")
+    if value < low:
+        raise SceneError(path, f"must be >= {low:g}, got {value:g}")
+    if value > high:
+        raise SceneError(path, f"must be <= {high:g}, got {value:g}")
 
 
 # --- the scene ---------------------------------------------------------------------------------------------
@@ -127,78 +130,137 @@ def _in_range(parameter: Parameter, value: float, path: str) -> None:
 class Shape:
     """One shape: kind, parameters as one flat row in the order that the kind declares them, colour.
 
-    Raises SceneError for an unknown kind or a parameter out of range.
+    `paint` names what is made of the colour, with `paint_parameters` as one flat row of what the paint declares after it.
+    Raises SceneError for an unknown kind or paint, or a number out of range.
     """
 
     kind: str
     parameters: tuple[float, ...]
-    color: Color
+    color: Color = BLACK
+    paint: str = FLAT
+    paint_parameters: tuple[float, ...] = ()
 
     def __post_init__(self) -> None:
-        declared = _scalar_names(_kind(self.kind))
-        if len(self.parameters) != len(declared):
-            raise SceneError(
-                "parameters", f"a {self.kind} has {len(declared)} numbers, got {len(self.parameters)}"
-            )
-        values = []
-        for value, (parameter, path) in zip(self.parameters, declared, strict=True):
-            values.append(_number(value, path))
-            _in_range(parameter, values[-1], path)
-        object.__setattr__(self, "parameters", tuple(values))
+        kind, paint = _kind(self.kind), _paint(self.paint)
+        checked = _checked(self.parameters, kind.parameters, "parameters", f"a {kind.name}")
+        object.__setattr__(self, "parameters", checked)
+        own = _checked(self.paint_parameters, paint.own, "paint_parameters", f"the paint {paint.name}")
+        object.__setattr__(self, "paint_parameters", own)
         object.__setattr__(self, "color", _color(self.color, "color"))
 
     @classmethod
-    def of(cls, kind: str, color: Color, **parameters: float | Sequence[float]) -> Shape:
+    def of(
+        cls, kind: str, color: Color = BLACK, paint: str = FLAT, **values: float | Sequence[float]
+    ) -> Shape:
         """A shape from parameters by name: `Shape.of("circle", (1, 0, 0), center=(0, 0), radius=0.2)`."""
-        return cls(kind, _flatten(_kind(kind), parameters), color)
+        own = {parameter.name for parameter in _paint(paint).own}
+        shape = {name: value for name, value in values.items() if name not in own}
+        painted = {name: value for name, value in values.items() if name in own}
+        row = _flatten(_kind(kind).parameters, shape, f"a {kind}")
+        return cls(kind, row, color, paint, _flatten(_paint(paint).own, painted, f"the paint {paint}"))
 
     def named(self) -> dict[str, float | tuple[float, ...]]:
-        """Parameters by name: a float, or a tuple for those of two components."""
-        rest = iter(self.parameters)
-        return {
-            parameter.name: tuple(next(rest) for _ in parameter.start)
-            if len(parameter.start) > 1
-            else next(rest)
-            for parameter in KINDS[self.kind].parameters
-        }
+        """The kind's parameters by name: a float, or a tuple for those of two components."""
+        return _named(KINDS[self.kind].parameters, self.parameters)
+
+    def painted(self) -> dict[str, float | tuple[float, ...]]:
+        """The paint's parameters by name, `color` first."""
+        return {"color": self.color, **_named(PAINTS[self.paint].own, self.paint_parameters)}
+
+    @property
+    def colors(self) -> tuple[Color, ...]:
+        """All colours that the paint is made of."""
+        return tuple(v for v in self.painted().values() if isinstance(v, tuple) and len(v) == 3)
+
+
+class Joint(NamedTuple):
+    """How a shape is joined to those before it in its layer: a name in `blend.JOINS`, and a length in scene units."""
+
+    join: str = UNION
+    smoothness: float = 0.0
 
 
 @dataclass(frozen=True)
 class Layer:
-    """One shape, or several of one kind joined by the exponential smooth minimum.
+    """A sequence of shapes joined left to right by smooth union, subtraction or intersection.
 
-    `falloff` and `smoothness` (of the union; 0 for one shape) are lengths in scene units. `opacity` is 0..1;
-    in an additive scene it is what the layer adds to alpha, −1..1. Raises SceneError.
+    `falloff` is a length in scene units, without meaning for a patch. `opacity` is 0..1; in an additive scene it is
+    what the layer adds to alpha, −1..1. `joints` say how each shape but the first is joined, 0 being sharp. Raises SceneError.
     """
 
     shapes: tuple[Shape, ...]
-    falloff: float
+    falloff: float = 0.0
     opacity: float = 1.0
-    smoothness: float = 0.0
+    joints: tuple[Joint, ...] = ()
 
     def __post_init__(self) -> None:
         if not self.shapes:
-            raise SceneError("union", "must hold at least 1 shape, got 0")
-        if len(self.shapes) > MAX_UNION:
-            raise SceneError("union", f"at most {MAX_UNION} shapes, got {len(self.shapes)}")
-        kinds = dict.fromkeys(shape.kind for shape in self.shapes)
-        if len(kinds) > 1:
-            raise SceneError("union", f"shapes must be of one kind, got {' and '.join(kinds)}")
-        object.__setattr__(self, "falloff", _between(self.falloff, "falloff", 0.0, LARGEST))
+            raise SceneError("shapes", "must hold at least 1 shape, got 0")
+        if len(self.shapes) > MAX_JOINED:
+            raise SceneError("shapes", f"at most {MAX_JOINED} shapes, got {len(self.shapes)}")
+        if len(self.joints) != len(self.shapes) - 1:
+            raise SceneError(
+                "joints", f"one fewer than shapes ({len(self.shapes) - 1}), got {len(self.joints)}"
+            )
+        patches = [shape.kind for shape in self.shapes if KINDS[shape.kind].patch is not None]
+        if patches and self.joints:
+            raise SceneError("shapes", f"a {patches[0]} can't be joined with others")
+        object.__setattr__(self, "falloff", _between(self.falloff, "falloff", 0.0, LONGEST_CANVAS))
         object.__setattr__(self, "opacity", _between(self.opacity, "opacity", -1.0, 1.0, COLOR_DECIMALS))
-        object.__setattr__(self, "smoothness", self._checked_smoothness())
+        joints = tuple(_numbered(list(self.joints), "shapes", _joint, first=1))
+        object.__setattr__(self, "joints", joints)
+        object.__setattr__(self, "shapes", (self.shapes[0], *map(_unpainted, self.shapes[1:], joints)))
 
-    def _checked_smoothness(self) -> float:
-        smoothness = _between(self.smoothness, "smoothness", 0.0, LARGEST)
-        if len(self.shapes) == 1:
-            return 0.0
-        if smoothness == 0.0:
-            raise SceneError("smoothness", "must be > 0, got 0")
-        return smoothness
+    @classmethod
+    def union(cls, shapes: Sequence[Shape], smoothness: float, falloff: float, opacity: float = 1.0) -> Layer:
+        """Shapes joined by unions of one smoothness."""
+        return cls(tuple(shapes), falloff, opacity, (Joint(UNION, smoothness),) * (len(shapes) - 1))
 
     @property
-    def kind(self) -> str:
-        return self.shapes[0].kind
+    def structure(self) -> Structure:
+        """What decides its formula."""
+        joins = ("", *(joint.join for joint in self.joints))
+        return tuple(
+            Part(shape.kind, shape.paint, join) for shape, join in zip(self.shapes, joins, strict=True)
+        )
+
+    @property
+    def numbers(self) -> list[float]:
+        """Its row: see `layer.slots`."""
+        row = [self.opacity, self.falloff]
+        for index, shape in enumerate(self.shapes):
+            row += [self.joints[index - 1].smoothness] if index else []
+            row += [*shape.color, *shape.paint_parameters] if self.structure[index].adds else []
+            row += shape.parameters
+        return row
+
+    @classmethod
+    def from_numbers(cls, structure: Structure, numbers: Sequence[float]) -> Layer:
+        """The layer of a row."""
+        rest = iter(numbers)
+
+        def take(parameters: Sequence[Parameter]) -> tuple[float, ...]:
+            return tuple(next(rest) for parameter in parameters for _ in range(parameter.width))
+
+        opacity, falloff = next(rest), next(rest)
+        shapes, joints = [], []
+        for part in structure:
+            joints += [Joint(part.join, next(rest))] if part.join else []
+            red, green, blue = take((BASE,)) if part.adds else BLACK
+            own = take(PAINTS[part.paint].own)
+            shape = take(KINDS[part.kind].parameters)
+            shapes.append(Shape(part.kind, shape, (red, green, blue), part.paint, own))
+        return cls(tuple(shapes), falloff, opacity, tuple(joints))
+
+
+def _unpainted(shape: Shape, joint: Joint) -> Shape:
+    """What only takes away has no colour."""
+    return shape if JOINS[joint.join].adds else Shape(shape.kind, shape.parameters)
+
+
+def _joint(joint: tuple[str, float]) -> Joint:
+    join, smoothness = joint
+    return Joint(_one_of(join, "join", JOINS), _between(smoothness, "smoothness", 0.0, LONGEST_CANVAS))
 
 
 @dataclass(frozen=True)
@@ -214,7 +276,7 @@ class Scene:
     height: int
     layers: tuple[Layer, ...]
     background: Color | None = (0.0, 0.0, 0.0)
-    compositing: str = "over"
+    compositing: str = OVER
 
     def __post_init__(self) -> None:
         _whole(self.width, "width", 1, MAX_SIDE)
@@ -226,7 +288,7 @@ class Scene:
             object.__setattr__(self, "background", background)
         if self.shape_count > MAX_SHAPES:
             raise SceneError("layers", f"at most {MAX_SHAPES} shapes, got {self.shape_count}")
-        lowest = -1.0 if self.compositing == "additive" else 0.0
+        lowest = COMPOSITING[self.compositing].lowest
         for index, layer in enumerate(self.layers):
             _check_layer_colors(layer, f"layers[{index}]", lowest)
 
@@ -240,13 +302,6 @@ class Scene:
         shortest = min(self.width, self.height)
         return self.width / shortest, self.height / shortest
 
-    def to(self, target: str, **options: Any) -> str | bytes:
-        """The scene exported, as in `scene.to("glsl")`; see `sdf2vec.export`."""
-        from .export import export
-        from .export.options import Options
-
-        return export(self, target, Options(**options))
-
 
 def _check_color(color: Color, path: str, lowest: float) -> None:
     for index, value in enumerate(color):
@@ -258,8 +313,10 @@ def _check_layer_colors(layer: Layer, path: str, lowest: float) -> None:
     if layer.opacity < lowest:
         raise SceneError(f"{path}.opacity", f"must be between {lowest:g} and 1, got {layer.opacity:g}")
     for index, shape in enumerate(layer.shapes):
-        inner = f"{path}.union[{index}]" if len(layer.shapes) > 1 else path
-        _check_color(shape.color, f"{inner}.color", lowest)
+        inner = f"{path}.shapes[{index}]" if layer.joints else path
+        for name, value in shape.painted().items():
+            if isinstance(value, tuple) and len(value) == 3:
+                _check_color(value, f"{inner}.{name}", lowest)
 
 
 def _one_of(value: Any, path: str, known: Mapping[str, Any]) -> str:
@@ -276,32 +333,51 @@ def _listed(names: Mapping[str, Any] | Sequence[str]) -> str:
     return ", ".join(names)
 
 
-def _scalar_names(kind: Kind) -> list[tuple[Parameter, str]]:
-    """Each float of a flat parameter row: what it belongs to, and its path."""
-    return [
-        (parameter, f"{parameter.name}[{i}]" if len(parameter.start) > 1 else parameter.name)
-        for parameter in kind.parameters
-        for i in range(len(parameter.start))
+def _paint(name: Any) -> Paint:
+    return PAINTS[_one_of(name, "paint", PAINTS)]
+
+
+def _checked(
+    row: Sequence[float], parameters: Sequence[Parameter], path: str, owner: str
+) -> tuple[float, ...]:
+    """A flat row of numbers, rounded. Raises SceneError for a wrong number of them, or one out of range."""
+    declared = [
+        (parameter, f"{parameter.name}[{i}]" if parameter.width > 1 else parameter.name)
+        for parameter in parameters
+        for i in range(parameter.width)
     ]
+    if len(row) != len(declared):
+        raise SceneError(path, f"{owner} has {len(declared)} numbers, got {len(row)}")
+    values = []
+    for value, (parameter, name) in zip(row, declared, strict=True):
+        values.append(_number(value, name, parameter.unit.decimals))
+        _in_range(parameter, values[-1], name)
+    return tuple(values)
 
 
-def _flatten(kind: Kind, parameters: Mapping[str, Any]) -> tuple[float, ...]:
+def _named(parameters: Sequence[Parameter], row: Sequence[float]) -> dict[str, float | tuple[float, ...]]:
+    rest = iter(row)
+    return {p.name: p.values_from([next(rest) for _ in range(p.width)]) for p in parameters}
+
+
+def _flatten(parameters: Sequence[Parameter], values: Mapping[str, Any], owner: str) -> tuple[float, ...]:
     flat: list[float] = []
-    names = [parameter.name for parameter in kind.parameters]
-    for parameter in kind.parameters:
-        if parameter.name not in parameters:
-            raise SceneError(parameter.name, f"missing; a {kind.name} has {_listed(names)}")
-        value = parameters[parameter.name]
-        count = len(parameter.start)
-        if count == 1:
+    names = [parameter.name for parameter in parameters]
+    for parameter in parameters:
+        if parameter.name not in values:
+            raise SceneError(parameter.name, f"missing; {owner} has {_listed(names)}")
+        value = values[parameter.name]
+        if parameter.width == 1:
             flat.append(value)
-        elif isinstance(value, (list, tuple)) and len(value) == count:
+        elif isinstance(value, (list, tuple)) and len(value) == parameter.width:
             flat.extend(value)
         else:
-            raise SceneError(parameter.name, f"must be a list of {count} numbers, got {_shown(value)}")
-    for name in parameters:
+            raise SceneError(
+                parameter.name, f"must be a list of {parameter.width} numbers, got {_shown(value)}"
+            )
+    for name in values:
         if name not in names:
-            raise SceneError(_field(name), f"unknown; a {kind.name} has {_listed(names)}")
+            raise SceneError(_field(name), f"unknown; {owner} has {_listed(names)}")
     return tuple(flat)
 
 
@@ -330,16 +406,24 @@ def save(scene: Scene, path: str | os.PathLike[str]) -> None:
 
 
 def _layer_object(layer: Layer) -> dict[str, Any]:
-    rest: dict[str, Any] = {"falloff": layer.falloff}
+    rest: dict[str, Any] = {}
+    if layer.falloff or KINDS[layer.shapes[0].kind].patch is None:
+        rest["falloff"] = layer.falloff
     if layer.opacity != 1.0:
         rest["opacity"] = layer.opacity
-    if len(layer.shapes) == 1:
+    if not layer.joints:
         return _shape_object(layer.shapes[0]) | rest
-    return {"union": [_shape_object(shape) for shape in layer.shapes], "smoothness": layer.smoothness} | rest
+    first, *others = layer.shapes
+    joined = [
+        joint._asdict() | _shape_object(shape, JOINS[joint.join].adds)
+        for joint, shape in zip(layer.joints, others, strict=True)
+    ]
+    return {"shapes": [_shape_object(first), *joined]} | rest
 
 
-def _shape_object(shape: Shape) -> dict[str, Any]:
-    return {"kind": shape.kind, **shape.named(), "color": shape.color}
+def _shape_object(shape: Shape, painted: bool = True) -> dict[str, Any]:
+    paint = {"paint": shape.paint} if painted and shape.paint != FLAT else {}
+    return {"kind": shape.kind, **shape.named(), **paint, **(shape.painted() if painted else {})}
 
 
 def _json(value: Any) -> str:
@@ -363,10 +447,9 @@ def loads(text: str | bytes) -> Scene:
     data = _object(_parse(text))
     if data.get("format") != FORMAT:
         raise SceneError("format", f"must be {FORMAT!r}, got {_shown(data.get('format'))}; not a scene file")
-    if data.get("version") != VERSION or isinstance(data["version"], bool):
-        raise SceneError(
-            "version", f"this program reads version {VERSION}, got {_shown(data.get('version'))}"
-        )
+    version = data.get("version")
+    if version not in (1, VERSION) or isinstance(version, bool):
+        raise SceneError("version", f"this program reads versions 1 to {VERSION}, got {_shown(version)}")
     known = {"format", "version", "width", "height", "compositing", "background", "layers"}
     _refuse_unknown(data, known)
     layers = _required(data, "layers")
@@ -377,7 +460,7 @@ def loads(text: str | bytes) -> Scene:
     return Scene(
         width=_required(data, "width"),
         height=_required(data, "height"),
-        layers=tuple(_numbered(layers, "layers", _read_layer)),
+        layers=tuple(_numbered(layers, "layers", _read_first_version if version == 1 else _read_layer)),
         background=_required(data, "background"),
         compositing=_required(data, "compositing"),
     )
@@ -424,8 +507,8 @@ def _integer(digits: str) -> int | float:
     return int(digits) if len(digits) <= 400 else math.copysign(math.inf, -1 if digits[0] == "-" else 1)
 
 
-def _numbered(items: list[Any], path: str, read: Callable[[Any], Any]) -> Iterator[Any]:
-    for index, item in enumerate(items):
+def _numbered(items: list[Any], path: str, read: Callable[[Any], Any], first: int = 0) -> Iterator[Any]:
+    for index, item in enumerate(items, first):
         with _within(f"{path}[{index}]"):
             yield read(item)
 
@@ -452,25 +535,48 @@ def _refuse_unknown(data: dict[str, Any], known: set[str]) -> None:
 
 def _read_layer(value: Any) -> Layer:
     data = _object(value)
-    outer = {name: data[name] for name in ("falloff", "opacity", "smoothness") if name in data}
-    falloff = _required(data, "falloff")
+    opacity = data.get("opacity", 1.0)
+    if "shapes" not in data:
+        shape = _read_shape({k: v for k, v in data.items() if k not in ("falloff", "opacity")})
+        return Layer((shape,), _falloff(data, shape), opacity)
+    _refuse_unknown(data, {"shapes", "falloff", "opacity"})
+    if not isinstance(data["shapes"], list):
+        raise SceneError("shapes", f"must be a list, got {_shown(data['shapes'])}")
+    read = list(_numbered(data["shapes"], "shapes", _read_joined))
+    if read and read[0][1] is not None:
+        raise SceneError("shapes[0].join", "the first shape is joined to nothing")
+    joints = tuple(joint or Joint() for _, joint in read[1:])
+    return Layer(tuple(shape for shape, _ in read), _required(data, "falloff"), opacity, joints)
+
+
+def _falloff(data: dict[str, Any], shape: Shape) -> Any:
+    return data.get("falloff", 0.0) if KINDS[shape.kind].patch is not None else _required(data, "falloff")
+
+
+def _read_joined(value: Any) -> tuple[Shape, Joint | None]:
+    data = dict(_object(value))
+    if "join" not in data and "smoothness" not in data:
+        return _read_shape(data), None
+    joint = _joint((_required(data, "join"), data.pop("smoothness", 0.0)))
+    return _read_shape({k: v for k, v in data.items() if k != "join"}, joint.join), joint
+
+
+def _read_shape(data: dict[str, Any], join: str = "") -> Shape:
+    kind, paint = _kind(_required(data, "kind")), data.get("paint", FLAT)
+    color = data.get("color", BLACK) if join and not JOINS[join].adds else _required(data, "color")
+    values = {name: item for name, item in data.items() if name not in ("kind", "color", "paint")}
+    return Shape.of(kind.name, color, paint, **values)
+
+
+def _read_first_version(value: Any) -> Layer:
+    """A layer of version 1: one shape, or a union of one smoothness."""
+    data = _object(value)
     if "union" not in data:
-        outer.pop("smoothness", None)
-        shapes: tuple[Shape, ...] = (_shape({k: v for k, v in data.items() if k not in outer}),)
-    else:
-        _refuse_unknown(data, {"union", "falloff", "opacity", "smoothness"})
-        if not isinstance(data["union"], list):
-            raise SceneError("union", f"must be a list, got {_shown(data['union'])}")
-        shapes = tuple(_numbered(data["union"], "union", _read_shape))
-    return Layer(shapes, falloff, outer.get("opacity", 1.0), outer.get("smoothness", 0.0))
-
-
-def _read_shape(value: Any) -> Shape:
-    return _shape(_object(value))
-
-
-def _shape(data: dict[str, Any]) -> Shape:
-    kind = _kind(_required(data, "kind"))
-    color = _required(data, "color")
-    parameters = {name: item for name, item in data.items() if name not in ("kind", "color")}
-    return Shape(kind.name, _flatten(kind, parameters), color)
+        data.pop("smoothness", None)
+        return _read_layer(data)
+    _refuse_unknown(data, {"union", "falloff", "opacity", "smoothness"})
+    if not isinstance(data["union"], list):
+        raise SceneError("union", f"must be a list, got {_shown(data['union'])}")
+    shapes = list(_numbered(data["union"], "union", lambda item: _read_shape(_object(item))))
+    smoothness = _required(data, "smoothness") if len(shapes) > 1 else 0.0
+    return Layer.union(shapes, smoothness, _required(data, "falloff"), data.get("opacity", 1.0))

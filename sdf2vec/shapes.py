@@ -10,19 +10,18 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Literal
 
+from .blend import CUTOFF
 from .expr import (
     FLOAT,
     VEC2,
     Expr,
-    Type,
     absolute,
     clamp,
-    components_of,
     const,
     cos,
     dot,
+    exp,
     fixed,
     function,
     length,
@@ -32,17 +31,19 @@ from .expr import (
     select,
     sin,
     sqrt,
-    var,
     vec2,
     vec4,
 )
+from .units import ANGLE, FREQUENCY, LENGTH, POSITION, Parameter
 
 Point = tuple[float, float]
-Unit = Literal["position", "length", "angle", "frequency"]
 
+PATCH_REACH = math.sqrt(
+    2.0 * math.log(1.0 / CUTOFF)
+)  # standard deviations from which on a Gaussian counts as 0
+PIXEL_VARIANCE = 1.0 / 12.0  # of a box of one pixel
 SMALLEST = 1e-6  # scene units; keeps divisors away from 0 at zero size
 TINY = 1e-20  # the same for squared lengths
-LARGEST = 65536.0  # scene units: the longest canvas there can be; anything larger is a mistake
 
 
 # --- outlines: what a vector format draws for the contour `distance = offset` -------------------------------
@@ -82,24 +83,34 @@ Outline = EllipseOutline | RectangleOutline | PolygonOutline
 
 
 @dataclass(frozen=True)
-class Parameter:
-    """One parameter of a shape.
+class Frame:
+    """The coordinates in which a shape is painted: the middle (vec2), the direction of x (vec2), half the size (vec2)."""
 
-    `unit`: position and length are in scene units, angle in radians, frequency in radians per scene unit.
-    `minimum` is excluded when `positive`. `start` is the value for a shape of size 1 at the origin: a
-    position or length is multiplied by the size where the shape is placed, a frequency divided by it.
+    origin: Expr
+    axis: Expr
+    half: Expr
+
+    def at(self, p: Expr) -> Expr:
+        """A point of the scene in the frame, in which the shape reaches from about −1 to 1 along both axes."""
+        return rotate(p - self.origin, self.axis) / maximum(self.half, SMALLEST)
+
+
+@dataclass(frozen=True)
+class Patch:
+    """Coverage of its own instead of a soft edge: `cover(p, pixel, *parameters)`, 0 from the distance
+    `reach(pixel, *parameters)` on, within −1..1 where `signed`.
     """
 
-    name: str
-    unit: Unit
-    start: tuple[float, ...]
-    minimum: float = -LARGEST
-    maximum: float = LARGEST
-    positive: bool = False
+    cover: Callable[..., Expr]
+    reach: Callable[..., Expr]
+    signed: bool = False
 
-    @property
-    def type(self) -> Type:
-        return VEC2 if len(self.start) == 2 else FLOAT
+
+def _upright_frame(extent: Callable[..., Expr], *parameters: Expr) -> Frame:
+    """The box around a sharp shape."""
+    box = extent(const(0.0), *parameters)
+    low, high = vec2(box.x, box.y), vec2(box.z, box.w)
+    return Frame((low + high) * 0.5, vec2(1.0, 0.0), (high - low) * 0.5)
 
 
 @dataclass(frozen=True)
@@ -111,7 +122,9 @@ class Kind:
     `extent(margin, *parameters)` is a box (low x, low y, high x, high y)
     that holds every point with distance ≤ margin, for margin ≥ 0. `outline(offset, *parameters)` is the
     contour at `distance = offset`, where it has a simple form. `area(*parameters)` is what it covers when sharp,
-    and `thickness(*parameters)` its least width; both may be those of a simpler shape near it.
+    and `thickness(*parameters)` its least width; both may be those of a simpler shape near it. `frame(*parameters)`
+    is what it is painted in, the box around it unless told. A `patch` has coverage of its own; the distance then
+    only says where it is, and it can't be joined with others.
     """
 
     name: str
@@ -123,26 +136,32 @@ class Kind:
     exact: bool
     outline: Callable[..., Outline] | None = None
     slope: Callable[..., Expr] = lambda *parameters: const(1.0)
+    own_frame: Callable[..., Frame] | None = None
+    patch: Patch | None = None
+
+    def frame(self, *parameters: Expr) -> Frame:
+        """What the shape is painted in."""
+        return self.own_frame(*parameters) if self.own_frame else _upright_frame(self.extent, *parameters)
 
     def variables(self, suffix: str = "") -> tuple[Expr, ...]:
         """One variable for each parameter."""
-        return tuple(var(parameter.name + suffix, parameter.type) for parameter in self.parameters)
+        return tuple(parameter.variable(suffix) for parameter in self.parameters)
 
     def scalars(self, suffix: str = "") -> tuple[Expr, ...]:
         """The float variables behind `variables`, in the order of a flat parameter row."""
-        return tuple(scalar for variable in self.variables(suffix) for scalar in components_of(variable))
+        return tuple(scalar for parameter in self.parameters for scalar in parameter.scalars(suffix))
 
 
 def _position(name: str, start: Point = (0.0, 0.0)) -> Parameter:
-    return Parameter(name, "position", start)
+    return Parameter(name, POSITION, start)
 
 
 def _size(name: str, *start: float) -> Parameter:
-    return Parameter(name, "length", start, minimum=0.0, positive=True)
+    return Parameter(name, LENGTH, start, positive=True)
 
 
 def _angle(name: str) -> Parameter:
-    return Parameter(name, "angle", (0.0,), minimum=-1000.0, maximum=1000.0)
+    return Parameter(name, ANGLE)
 
 
 # --- helpers ------------------------------------------------------------------------------------------------
@@ -219,6 +238,10 @@ def _ellipse_extent(margin: Expr, center: Expr, radii: Expr, angle: Expr) -> Exp
     along, across = _axis(angle) * grown.x, _axis(angle) * grown.y
     half = vec2(length(vec2(along.x, across.y)), length(vec2(along.y, across.x)))
     return _box_around(center, half)
+
+
+def _turned_frame(center: Expr, half: Expr, angle: Expr, *rest: Expr) -> Frame:
+    return Frame(center, _axis(angle), half)
 
 
 def _ellipse_area(center: Expr, radii: Expr, angle: Expr) -> Expr:
@@ -344,6 +367,63 @@ def _displaced_slope(center: Expr, radius: Expr, amplitude: Expr, frequency: Exp
     return 1.0 + absolute(amplitude) * length(frequency)
 
 
+# --- patches: coverage of their own ---------------------------------------------------------------------------
+
+
+def _widened(radii: Expr, pixel: Expr) -> Expr:
+    """Standard deviations of a Gaussian that a pixel's box has blurred."""
+    squared = radii * radii + pixel * pixel * PIXEL_VARIANCE
+    return vec2(sqrt(squared.x), sqrt(squared.y))
+
+
+@function("gaussianCover", q=VEC2, radii=VEC2, pixel=FLOAT)
+def gaussian_cover(q: Expr, radii: Expr, pixel: Expr) -> Expr:
+    """A Gaussian of these standard deviations that is 1 in its middle, 0 where it is next to nothing, and never finer than pixels."""
+    wide = let("wide", _widened(radii, pixel))
+    r = let("r", q / wide)
+    height = radii.x * radii.y / (wide.x * wide.y)
+    return height * maximum(exp(-0.5 * dot(r, r)) - CUTOFF, 0.0) * (1.0 / (1.0 - CUTOFF))
+
+
+@function("gaborCover", q=VEC2, radii=VEC2, frequency=FLOAT, phase=FLOAT, pixel=FLOAT)
+def gabor_cover(q: Expr, radii: Expr, frequency: Expr, phase: Expr, pixel: Expr) -> Expr:
+    """A cosine along x within a Gaussian (Gabor 1946), faint where its waves are finer than pixels."""
+    step = let("step", frequency * pixel)
+    seen = exp(-0.5 * PIXEL_VARIANCE * step * step)
+    return gaussian_cover(q, radii, pixel) * seen * cos(frequency * q.x + phase)
+
+
+def _gaussian_cover(p: Expr, pixel: Expr, center: Expr, radii: Expr, angle: Expr) -> Expr:
+    return gaussian_cover(rotate(p - center, _axis(angle)), radii, pixel)
+
+
+def _gabor_cover(
+    p: Expr, pixel: Expr, center: Expr, radii: Expr, angle: Expr, frequency: Expr, phase: Expr
+) -> Expr:
+    return gabor_cover(rotate(p - center, _axis(angle)), radii, frequency, phase, pixel)
+
+
+def _patch_reach(pixel: Expr, center: Expr, radii: Expr, *rest: Expr) -> Expr:
+    shortest = maximum(_smaller_component(radii), SMALLEST)
+    return PATCH_REACH * sqrt(shortest * shortest + pixel * pixel * PIXEL_VARIANCE) - shortest
+
+
+def _patch_distance(p: Expr, center: Expr, radii: Expr, angle: Expr, *wave: Expr) -> Expr:
+    return _ellipse_distance(p, center, radii, angle)
+
+
+def _patch_extent(margin: Expr, center: Expr, radii: Expr, angle: Expr, *wave: Expr) -> Expr:
+    return _ellipse_extent(margin, center, radii, angle)
+
+
+def _patch_area(center: Expr, radii: Expr, *rest: Expr) -> Expr:
+    return math.tau * radii.x * radii.y
+
+
+def _patch_thickness(center: Expr, radii: Expr, *rest: Expr) -> Expr:
+    return 2.0 * _smaller_component(radii)
+
+
 # --- the shapes ---------------------------------------------------------------------------------------------
 
 KINDS: dict[str, Kind] = {
@@ -368,6 +448,7 @@ KINDS: dict[str, Kind] = {
             _ellipse_thickness,
             exact=False,
             outline=_ellipse_outline,
+            own_frame=_turned_frame,
         ),
         Kind(
             "box",
@@ -375,7 +456,7 @@ KINDS: dict[str, Kind] = {
                 _position("center"),
                 _size("half_size", 1.0, 0.75),
                 _angle("angle"),
-                Parameter("corner_radius", "length", (0.1,), minimum=0.0),
+                Parameter("corner_radius", LENGTH, (0.1,)),
             ),
             _box_distance,
             _box_extent,
@@ -383,6 +464,7 @@ KINDS: dict[str, Kind] = {
             _box_thickness,
             exact=True,
             outline=_box_outline,
+            own_frame=_turned_frame,
         ),
         Kind(
             "triangle",
@@ -399,8 +481,8 @@ KINDS: dict[str, Kind] = {
             (
                 _position("center"),
                 _size("radius", 1.0),
-                Parameter("amplitude", "length", (0.2,), minimum=0.0),
-                Parameter("frequency", "frequency", (1.5, 1.5), minimum=-1000.0, maximum=1000.0),
+                Parameter("amplitude", LENGTH, (0.2,)),
+                Parameter("frequency", FREQUENCY, (1.5, 1.5)),
             ),
             _displaced_distance,
             _displaced_extent,
@@ -408,6 +490,34 @@ KINDS: dict[str, Kind] = {
             _displaced_thickness,
             exact=False,
             slope=_displaced_slope,
+        ),
+        Kind(
+            "gaussian",
+            (_position("center"), _size("radii", 0.8, 0.5), _angle("angle")),
+            _patch_distance,
+            _patch_extent,
+            _patch_area,
+            _patch_thickness,
+            exact=False,
+            own_frame=_turned_frame,
+            patch=Patch(_gaussian_cover, _patch_reach),
+        ),
+        Kind(
+            "gabor",
+            (
+                _position("center"),
+                _size("radii", 0.8, 0.8),
+                _angle("angle"),
+                Parameter("frequency", FREQUENCY, (2.0,)),
+                Parameter("phase", ANGLE),
+            ),
+            _patch_distance,
+            _patch_extent,
+            _patch_area,
+            _patch_thickness,
+            exact=False,
+            own_frame=_turned_frame,
+            patch=Patch(_gabor_cover, _patch_reach, signed=True),
         ),
     )
 }

@@ -5,73 +5,78 @@ from __future__ import annotations
 import json
 from collections.abc import Iterable
 
-from ..blend import (
-    COMPOSITING,
-    FRAMINGS,
-    coverage,
-    display,
-    grid_point,
-    reach,
-    union_distance,
-    union_reach,
-    union_weight,
-)
-from ..expr import VEC2, VEC4, Expr, scalarize, var, vec3
+from ..blend import COMPOSITING, FRAMINGS, JOINS, display, grid_point, union_reach
+from ..expr import VEC2, VEC4, Expr, scalarize, var
+from ..layer import PIXEL, Formula, P, Part
 from ..lower.javascript import function_text
 from ..lower.shader import GLSL, definition, expression, used_functions
-from ..scene import FORMAT, MAX_UNION, VERSION, Scene
+from ..paints import FLAT, PAINTS
+from ..scene import FORMAT, MAX_JOINED, VERSION, Scene
 from ..shapes import KINDS
 from ..templating import template
 from .options import Options
-from .records import Form, P, record_scalars
-from .shader import DATA_WIDTH
+from .records import Form, Variant, record_scalars
+from .shader import DATA_WIDTH, table_part
 from .tiles import COARSEST
 
-FORM = Form(tuple(KINDS), unions=True)
+SLACK = var("slack")
 
 
 def component(scene: Scene, options: Options) -> str:
     """An ES module that defines the element; it is the same for every scene."""
+    variants = tuple(
+        Variant(kind, paint)
+        for kind in sorted(KINDS, key=lambda name: KINDS[name].patch is not None)
+        for paint in PAINTS
+    )
+    forms = {name: Form(variants, tuple(JOINS), name) for name in COMPOSITING}
     return template("component.js.jinja").render(
         format=FORMAT,
         version=VERSION,
         coarsest=COARSEST,
-        parameters=json.dumps({kind.name: [p.name for p in kind.parameters] for kind in KINDS.values()}),
-        kinds=list(KINDS),
-        formulas="\n\n".join(_formulas()),
-        stride=FORM.stride,
+        kinds=json.dumps({kind.name: [p.name for p in kind.parameters] for kind in KINDS.values()}),
+        paints=json.dumps({paint.name: [p.name for p in paint.parameters] for paint in PAINTS.values()}),
+        widths=json.dumps({p.name: p.width for paint in PAINTS.values() for p in paint.parameters}),
+        joins=json.dumps(list(JOINS)),
+        variants=json.dumps([" ".join(variant) for variant in variants]),
+        flat=FLAT,
+        formulas="\n\n".join(_formulas(variants)),
+        drawn=json.dumps({name: expression(form.drawn(), GLSL) for name, form in forms.items()}),
+        head=forms["over"].head,
+        stride=forms["over"].stride,
         size="vec2(${size})",
-        **_shader_parts(),
         width=DATA_WIDTH,
+        **_shader_parts(list(forms.values())),
     )
 
 
-def _formulas() -> Iterable[str]:
+def _formulas(variants: Iterable[Variant]) -> Iterable[str]:
     """What the element computes itself: records, and boxes to make lists from."""
+    yield "const RECORDS = {};\nconst BOXES = {};"
+    for variant in variants:
+        record = function_text(f'RECORDS["{" ".join(variant)}"]', record_scalars(variant), variant.scalars)
+        yield record.removeprefix("const ")
     for kind in KINDS.values():
-        yield function_text(f"{kind.name}Record", record_scalars(kind.name), kind.scalars())
-        margin = var("margin")
-        box = scalarize(kind.extent(margin, *kind.variables()))
-        yield function_text(f"{kind.name}Box", box, [margin, *kind.scalars()])
-    falloff, pixel, smoothness = (var(name) for name in ("falloff", "pixel", "smoothness"))
-    farthest = reach(falloff, pixel) + union_reach(MAX_UNION, smoothness)
-    yield function_text("layerReach", scalarize(farthest), [falloff, pixel, smoothness])
+        formula = Formula.of((Part(kind.name),))
+        inputs = [SLACK, PIXEL, formula.row.of(None, "falloff")]
+        inputs += [scalar for parameter in kind.parameters for scalar in parameter.scalars("_0")]
+        box = function_text(f"BOXES.{kind.name}", formula.bounds(SLACK)[:4], inputs)
+        yield box.removeprefix("const ")
+    smoothness = var("smoothness")
+    yield function_text("unionReach", scalarize(union_reach(MAX_JOINED, smoothness)), [smoothness])
 
 
-def _shader_parts() -> dict[str, object]:
+def _shader_parts(forms: list[Form]) -> dict[str, object]:
     """What the templates of shaders take, with JavaScript's `${…}` where the scene decides."""
-    resolution, c, d = var("resolution", VEC2), var("c", VEC4), var("d")
+    resolution, c = var("resolution", VEC2), var("c", VEC4)
     place, pixel_size = FRAMINGS["fit"]
     cell = grid_point(P, var("vec2(${low})", VEC2), var("vec2(${perUnit})", VEC2))
-    blends = [blend(c, vec3(0.0), d, coverage(d, d, d)) for blend in COMPOSITING.values()]
     frame = [display(c), place(P, resolution, P), pixel_size(resolution, P), cell]
-    distances = FORM.distances()
-    roots: list[Expr] = [*(distance for _, distance in distances), *blends, union_weight(d, d, d), *frame]
-    functions = used_functions([*roots, union_distance(d, d, d)])
+    drawn = [form.drawn() for form in forms]
+    roots: list[Expr] = [*(field for _, field in forms[0].fields()), *drawn, forms[0].joined(), *frame]
     return {
-        "functions": "\n\n".join(definition(function, GLSL) for function in functions),
+        "functions": "\n\n".join(definition(function, GLSL) for function in used_functions(roots)),
         "background": "vec4(${background})",
-        "motion": "",
         "packed": None,
         "layers": [],
         "data": {"width": DATA_WIDTH, "lists": "${lists}"},
@@ -83,13 +88,5 @@ def _shader_parts() -> dict[str, object]:
             "place": expression(cell, GLSL),
             "coarsest": COARSEST,
         },
-        "table": {
-            "count": "${count}",
-            "stride": FORM.stride,
-            "union": True,
-            "blend": "${blend}",
-            "kind": FORM.slot(FORM.kind_place),
-            "kinds": [(kind, expression(distance, GLSL)) for kind, distance in distances],
-        },
-        "compositing": json.dumps({name: blend.name for name, blend in COMPOSITING.items()}),
+        "table": table_part(forms[0], GLSL) | {"count": "${count}", "drawn": "${drawn}"},
     }

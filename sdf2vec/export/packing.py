@@ -12,34 +12,25 @@ the same to every compiler.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, replace
-from typing import Any
 
 import numpy as np
+import torch
 from numpy.typing import NDArray
 
-from ..expr import (
-    FLOAT,
-    VEC2,
-    VEC3,
-    Expr,
-    components_of,
-    const,
-    constant,
-    function,
-    length,
-    let,
-    scalarize,
-    substitute,
-    var,
-    vec2,
-    vec3,
-)
-from ..lower.shader import Dialect, expression
-from ..scene import COLOR_DECIMALS, GEOMETRY_DECIMALS, Layer, Scene, Shape
-from ..shapes import KINDS, Parameter
-from .records import P
+from ..blend import COMPOSITING, MIN_FALLOFF_PIXELS
+from ..expr import VEC2, VECTOR, Expr, components_of, const, constant, operation, scalarize, substitute, var
+from ..layer import JOIN, LOOK, slots
+from ..paints import PAINTS
+from ..render import reference
+from ..render.draw import draw, is_large
+from ..render.fused import threads_of_its_own
+from ..render.tensors import from_scene
+from ..scene import Joint, Layer, Scene, Shape
+from ..shapes import KINDS
+from ..units import ANGLE, COLOR_DECIMALS, FREQUENCY, GEOMETRY_DECIMALS, Fractions, Parameter
+from .records import Variant, joins_of, variant_of, variants_of
 from .tiles import Grid, layer_bounds
 
 LIMIT = 0.95  # 8-bit levels: largest error of the picture; drawing adds less than 0.05
@@ -49,15 +40,18 @@ SAMPLE = 1 << 21  # shapes × pixels that are looked at where no kernels are wor
 CELLS = 16  # along the longer side of the grid
 CELL_BITS = 4
 CHOICE_BITS = 3  # say how many more bits than the least a layer's fractions have
+COUNT_BITS = 7  # of the number of shapes in a layer
 LEAST_BITS, MOST_BITS = 4, 24  # of a fraction; a float holds no more
 FEWER = 5  # bits that all layers begin without, when the fewest are looked for
 ROUNDS = 24
 WORST = 4096  # pixels that are looked at in each round
+FAINT = 0.05  # opacity below which layers are not told apart
+PLACE = "place"  # the precision of what lies in a layer's box: bits by how sharp its edge is
 
 Floats = NDArray[np.float32]
+Limits = tuple[float, float]
 
-CORNER, BOX, SPAN = var("corner", VEC2), var("box", VEC2), length(var("box", VEC2))
-V = tuple(var(f"v[{i}]") for i in range(8))
+CORNER, BOX = var("corner", VEC2), var("box", VEC2)
 
 
 @dataclass(frozen=True)
@@ -77,15 +71,7 @@ FIELDS = ("places", "falloff", "color", "opacity")
 FINEST = Precision(14.0, 20, 16, 16)
 
 
-@dataclass(frozen=True)
-class Ranges:
-    """Between which values the fractions of a scene lie."""
-
-    falloff: float
-    smoothness: float
-    color: tuple[float, float]
-    opacity: tuple[float, float]
-    frequency: tuple[float, float]
+Ranges = dict[str, Limits]  # by the name of a unit: between which values the fractions of a scene lie
 
 
 @dataclass(frozen=True)
@@ -98,76 +84,33 @@ class Packed:
     least: int  # bits of a fraction, at least
     precision: Precision
     ranges: Ranges
+    variants: tuple[Variant, ...]
+    joins: tuple[str, ...]
     error: float
 
 
 # --- what a fraction stands for ----------------------------------------------------------------------------
 
 
-def dequantised(parameter: Parameter, fractions: Sequence[Expr], ranges: Ranges) -> Expr:
+def decoded(parameter: Parameter, fractions: Sequence[Expr], ranges: Ranges) -> Expr:
     """A parameter from its fractions 0..1; `corner` and `box` are the layer's cells."""
-    if parameter.unit == "position":
-        return CORNER + BOX * vec2(*fractions)
-    scale: dict[str, Callable[[Expr], Expr]] = {
-        "length": lambda v: SPAN * v,
-        "angle": lambda v: 2.0 * math.pi * v,
-        "frequency": lambda v: linear(v, ranges.frequency),
-    }
-    values = [scale[parameter.unit](fraction) for fraction in fractions]
-    return vec2(*values) if parameter.type is VEC2 else values[0]
-
-
-@function("grown", v=FLOAT, largest=FLOAT)
-def grown(v: Expr, largest: Expr) -> Expr:
-    """A length from its fraction, finer near 0."""
-    square = let("square", v * v)
-    return square * square * largest
-
-
-def linear(v: Expr, limits: tuple[float, float]) -> Expr:
-    """A value between limits from its fraction."""
-    low, high = limits
-    return low + (high - low) * v
-
-
-def distance(kind: str, ranges: Ranges) -> Expr:
-    """Signed distance of the point `p` from the fractions v[0], v[1], …"""
-    rest = iter(V)
-    parameters = (
-        dequantised(parameter, [next(rest) for _ in parameter.start], ranges)
-        for parameter in KINDS[kind].parameters
-    )
-    return KINDS[kind].distance(P, *parameters)
-
-
-def fraction_count(kind: str) -> int:
-    """How many fractions a shape's parameters are."""
-    return len(KINDS[kind].scalars())
+    width = parameter.width
+    value = fractions[0] if width == 1 else operation(VECTOR[width].value, *fractions)
+    return parameter.unit.codec.decode(value, Fractions(CORNER, BOX, ranges))
 
 
 def ranges_of(scene: Scene) -> Ranges:
-    """The ranges of a scene's numbers."""
-    shapes = [shape for layer in scene.layers for shape in layer.shapes]
-    colors = [channel for shape in shapes for channel in shape.color]
-    frequencies = [
-        value
-        for shape in shapes
-        for parameter, value in zip(_units(shape.kind), shape.parameters, strict=True)
-        if parameter.unit == "frequency"
-    ]
-    signed = scene.compositing == "additive"
-    return Ranges(
-        falloff=max((layer.falloff for layer in scene.layers), default=0.0),
-        smoothness=max((layer.smoothness for layer in scene.layers), default=0.0),
-        color=(min(colors, default=0.0), max(colors, default=1.0)) if signed else (0.0, 1.0),
-        opacity=(-1.0, 1.0) if signed else (0.0, 1.0),
-        frequency=(min(frequencies, default=0.0), max(frequencies, default=0.0)),
-    )
-
-
-def _units(kind: str) -> list[Parameter]:
-    """The parameter that each number of a flat row belongs to."""
-    return [parameter for parameter in KINDS[kind].parameters for _ in parameter.start]
+    """The least and the largest of a scene's numbers, by unit."""
+    found: Ranges = {}
+    for layer in scene.layers:
+        rest = iter(layer.numbers)
+        for slot in slots(layer.structure):
+            values = [next(rest) for _ in range(slot.parameter.width)]
+            low, high = found.get(slot.parameter.unit.name, (math.inf, -math.inf))
+            found[slot.parameter.unit.name] = (min(low, *values), max(high, *values))
+    compositing = COMPOSITING[scene.compositing]
+    whole = {"opacity": (compositing.lowest, 1.0)} | ({} if compositing.signed else {"color": (0.0, 1.0)})
+    return found | whole
 
 
 # --- packing ------------------------------------------------------------------------------------------------
@@ -237,10 +180,6 @@ class _View:
     """The pixels at which pictures are compared: a full HD canvas, or of a small scene an even sample of it."""
 
     def __init__(self, scene: Scene) -> None:
-        from ..render import reference
-        from ..render.draw import is_large
-        from ..render.tensors import from_scene
-
         self.width, self.height = CANVAS if scene.width >= scene.height else CANVAS[::-1]
         pixels = self.width * self.height
         self.whole = is_large(scene, self.width, self.height)
@@ -250,13 +189,6 @@ class _View:
 
     def picture(self, scene: Scene) -> Floats:
         """The scene's pixels, [4, P]."""
-        import torch
-
-        from ..render import reference
-        from ..render.draw import draw
-        from ..render.fused import threads_of_its_own
-        from ..render.tensors import from_scene
-
         if self.whole:
             pixels: Floats = draw(scene, self.width, self.height).numpy()
             return pixels.reshape(4, -1)
@@ -267,9 +199,6 @@ class _View:
 
     def coverages(self, scene: Scene, chosen: NDArray[np.int64]) -> Floats:
         """Coverage of every layer at some of the pixels, [L, B]."""
-        from ..render import reference
-        from ..render.tensors import from_scene
-
         covers, _ = reference.layers_at(from_scene(scene), self.x[chosen], self.y[chosen], self.pixel)
         found: Floats = covers.numpy()
         return found
@@ -281,8 +210,8 @@ class _Packer:
     def __init__(self, scene: Scene, slack: float) -> None:
         self.scene = scene
         self.ranges = ranges_of(scene)
-        self.kinds = [k for k in KINDS if any(layer.kind == k for layer in scene.layers)]
-        self.unions = any(len(layer.shapes) > 1 for layer in scene.layers)
+        self.variants, self.joins = variants_of(scene), joins_of(scene)
+        self.layout = Layout(self.variants, self.joins)
         self.grid, self.cells = _cell_boxes(scene, slack)
         self.finest = min(CANVAS)
 
@@ -305,12 +234,16 @@ class _Packer:
         return [min(max(count, least), highest) for count in wanted]
 
     def _wanted(self, layer: Layer, cells: tuple[int, ...], precision: Precision) -> int:
-        turning = any(parameter.unit in ("angle", "frequency") for parameter in KINDS[layer.kind].parameters)
+        turning = any(
+            parameter.unit in (ANGLE, FREQUENCY)
+            for shape in layer.shapes
+            for parameter in KINDS[shape.kind].parameters
+        )
         return math.ceil(math.log2(self._steepness(layer, cells)) + precision.places + 2 * turning)
 
     def _steepness(self, layer: Layer, cells: tuple[int, ...]) -> float:
         """How much a picture changes when the layer moves by the size of its cells, in full steps of colour."""
-        softness = max(layer.falloff, 1.6 / self.finest) / max(abs(layer.opacity), 0.05)
+        softness = max(layer.falloff, MIN_FALLOFF_PIXELS / self.finest) / max(abs(layer.opacity), FAINT)
         sizes = (cells[2] - cells[0] + 1, cells[3] - cells[1] + 1)
         return math.hypot(*sizes) / self.grid.per_unit / softness
 
@@ -318,7 +251,7 @@ class _Packer:
         self, view: _View, chosen: NDArray[np.int64], counts: NDArray[np.int64]
     ) -> NDArray[np.int64]:
         """The layers whose coarse places can be why the picture is off at some pixels."""
-        cover = view.coverages(self.scene, chosen)
+        cover = np.abs(view.coverages(self.scene, chosen))
         steep = np.array([self._steepness(*pair) for pair in zip(self.scene.layers, self.cells, strict=True)])
         share = cover * (1.0 - cover) * (steep * 0.5**counts)[:, None]
         guilty = (share >= 0.5 * share.max(axis=0)) & (share > 0.0)
@@ -333,110 +266,165 @@ class _Packer:
             stream.put(count - least, CHOICE_BITS)
             for value, bits in self._layer(layer, cells, count, precision)[0]:
                 stream.put(value, bits)
-        words = stream.words()
-        return Packed(words, stream.bits, self.grid, least, precision, self.ranges, error)
+        words = stream.words(AHEAD + self.layout.longest(precision, least + 2**CHOICE_BITS) // WORD)
+        shared = (self.grid, least, precision, self.ranges, self.variants, self.joins, error)
+        return Packed(words, stream.bits, *shared)
 
     def _layer(
         self, layer: Layer, cells: tuple[int, ...], count: int, precision: Precision
     ) -> tuple[list[tuple[int, int]], Layer]:
         """The numbers of a layer with their bits, and the layer that they say."""
-        ranges, coder = self.ranges, _Coder()
-        if len(self.kinds) > 1:
-            coder.whole(self.kinds.index(layer.kind), KIND_BITS)
-        if self.unions:
-            coder.whole(len(layer.shapes) - 1, UNION_BITS)
-        falloff = coder.root(layer.falloff, ranges.falloff, precision.falloff)
-        opacity = coder.linear(layer.opacity, ranges.opacity, precision.opacity)
-        smoothness = (
-            coder.root(layer.smoothness, ranges.smoothness, precision.falloff) if self.unions else 0.0
-        )
-        shapes = [self._shape(shape, cells, count, precision, coder) for shape in layer.shapes]
-        return coder.numbers, Layer(tuple(shapes), falloff, opacity, smoothness)
+        coder = _Coder(self.ranges, *self._box(cells), precision, count)
+        if self.joins:
+            coder.whole(len(layer.shapes) - 1, COUNT_BITS)
+        else:
+            coder.whole(self.variants.index(variant_of(layer.shapes[0])), self.layout.variant_bits)
+        falloff = coder.value(layer.falloff, LOOK[1])
+        opacity = coder.value(layer.opacity, LOOK[0])
+        shapes, joints = [], []
+        for index, shape in enumerate(layer.shapes):
+            joint, said = self._shape(shape, layer.joints[index - 1] if index else None, coder)
+            shapes.append(said)
+            joints.append(joint)
+        return coder.numbers, Layer(tuple(shapes), falloff, opacity, tuple(joints[1:]))
 
-    def _shape(
-        self, shape: Shape, cells: tuple[int, ...], count: int, precision: Precision, coder: _Coder
-    ) -> Shape:
-        red, green, blue = (coder.linear(c, self.ranges.color, precision.color) for c in shape.color)
-        starts, ends = self._limits(shape.kind, cells)
-        values = [
-            coder.linear(_turned(value, parameter), (start, end), count)
-            for value, parameter, start, end in zip(
-                shape.parameters, _units(shape.kind), starts, ends, strict=True
-            )
+    def _shape(self, shape: Shape, joint: Joint | None, coder: _Coder) -> tuple[Joint, Shape]:
+        start, said = coder.bits, Joint()
+        if self.joins:
+            joint = joint or Joint(self.joins[0], 0.0)
+            coder.whole(self.variants.index(variant_of(shape)), self.layout.variant_bits)
+            coder.whole(self.joins.index(joint.join), self.layout.join_bits)
+            said = Joint(joint.join, coder.value(joint.smoothness, JOIN))
+        values: dict[Parameter, list[float]] = {}
+        given = _by_parameter(shape)
+        for parameter in by_precision(given):
+            values[parameter] = coder.values(given[parameter], parameter)
+        if self.joins:
+            coder.fill(start + self.layout.longest(coder.precision, coder.count))
+        color, *own = (values[parameter] for parameter in PAINTS[shape.paint].parameters)
+        row = [value for parameter in KINDS[shape.kind].parameters for value in values[parameter]]
+        return said, Shape(shape.kind, tuple(row), (color[0], color[1], color[2]), shape.paint, tuple(v for part in own for v in part))
+
+    def _box(self, cells: tuple[int, ...]) -> tuple[Limits, Limits]:
+        """Low corner and size of a layer's cells, in scene units."""
+        low = [c / self.grid.per_unit + start for c, start in zip(cells[:2], self.grid.low, strict=True)]
+        high = [(c + 1) / self.grid.per_unit + start for c, start in zip(cells[2:], self.grid.low, strict=True)]
+        return (low[0], low[1]), (high[0] - low[0], high[1] - low[1])
+
+
+def _by_parameter(shape: Shape) -> dict[Parameter, list[float]]:
+    """All numbers of a shape by what they are."""
+    rest = iter((*shape.color, *shape.paint_parameters, *shape.parameters))
+    declared = (*PAINTS[shape.paint].parameters, *KINDS[shape.kind].parameters)
+    return {parameter: [next(rest) for _ in range(parameter.width)] for parameter in declared}
+
+
+def by_precision(parameters: Iterable[Parameter]) -> list[Parameter]:
+    """Parameters in the order in which a packed shape has them: those of a precision of their own first."""
+    return sorted(parameters, key=lambda parameter: parameter.unit.codec.precision == PLACE)
+
+
+class _Coder:
+    """Collects whole numbers with their bits, for one layer; each method returns the value that its number says."""
+
+    def __init__(self, ranges: Ranges, corner: Limits, box: Limits, precision: Precision, count: int) -> None:
+        self.numbers: list[tuple[int, int]] = []
+        self.bits = 0
+        self.ranges, self.precision, self.count = ranges, precision, count
+        names = (*components_of(CORNER), *components_of(BOX))
+        self._known = dict(zip(names, map(const, (*corner, *box)), strict=True))
+
+    def whole(self, value: int, bits: int) -> int:
+        self.numbers.append((value, bits))
+        self.bits += bits
+        return value
+
+    def fill(self, bits: int) -> None:
+        """Nothing, up to so many bits in all."""
+        while self.bits < bits:
+            self.whole(0, min(WORD, bits - self.bits))
+
+    def value(self, value: float, parameter: Parameter) -> float:
+        """A parameter of one component."""
+        (said,) = self.values([value], parameter)
+        return said
+
+    def values(self, values: Sequence[float], parameter: Parameter) -> list[float]:
+        """All components of a parameter."""
+        codec = parameter.unit.codec
+        bits = self.count if codec.precision == PLACE else getattr(self.precision, codec.precision)
+        lows, highs = (self._ends(parameter, end) for end in (0.0, 1.0))
+        return [
+            _legal(low + (high - low) * self._fraction(value, low, high, bits, parameter), parameter)
+            for value, low, high in zip(values, lows, highs, strict=True)
         ]
-        legal = [_legal(v, parameter) for v, parameter in zip(values, _units(shape.kind), strict=True)]
-        return Shape(shape.kind, tuple(legal), (red, green, blue))
 
-    def _limits(self, kind: str, cells: tuple[int, ...]) -> tuple[list[float], list[float]]:
-        """The parameters for all fractions 0, and for all fractions 1."""
-        low = [
-            place / self.grid.per_unit + start for place, start in zip(cells[:2], self.grid.low, strict=True)
-        ]
-        high = [
-            (place + 1) / self.grid.per_unit + start
-            for place, start in zip(cells[2:], self.grid.low, strict=True)
-        ]
-        box = (high[0] - low[0], high[1] - low[1])
-        zeros, ones = _extremes(kind, self.ranges, (low[0], low[1]), box)
-        return zeros, ones
+    def _fraction(self, value: float, low: float, high: float, bits: int, parameter: Parameter) -> float:
+        power, most = parameter.unit.codec.power, (1 << bits) - 1
+        value = value % math.tau if parameter.unit is ANGLE else value
+        share = min(max((value - low) / (high - low), 0.0), 1.0) if high > low else 0.0
+        fraction: float = self.whole(round(share ** (1 / power) * most), bits) / most
+        return fraction**power
 
-
-KIND_BITS = (len(KINDS) - 1).bit_length()
-UNION_BITS = 7
-
-
-def _turned(value: float, parameter: Parameter) -> float:
-    """An angle within one turn."""
-    return value % (2.0 * math.pi) if parameter.unit == "angle" else value
+    def _ends(self, parameter: Parameter, end: float) -> list[float]:
+        """What all fractions 0, or all fractions 1, stand for."""
+        meaning = decoded(parameter, [const(end)] * parameter.width, self.ranges)
+        return [constant(substitute(scalar, self._known)) for scalar in scalarize(meaning)]
 
 
 def _legal(value: float, parameter: Parameter) -> float:
     """What a scene takes: a length that must be positive may have become 0."""
-    least = parameter.minimum + (10.0**-GEOMETRY_DECIMALS if parameter.positive else 0.0)
-    return min(max(value, least), parameter.maximum)
+    least = parameter.unit.low + (10.0**-GEOMETRY_DECIMALS if parameter.positive else 0.0)
+    return min(max(value, least), parameter.unit.high)
 
 
-def _extremes(
-    kind: str, ranges: Ranges, low: tuple[float, float], box: tuple[float, float]
-) -> tuple[list[float], list[float]]:
-    found: list[list[float]] = []
-    for end in (0.0, 1.0):
-        known = _known(low, box)
-        values = []
-        for parameter in KINDS[kind].parameters:
-            meaning = dequantised(parameter, [const(end)] * len(parameter.start), ranges)
-            values += [constant(substitute(scalar, known)) for scalar in scalarize(meaning)]
-        found.append(values)
-    return found[0], found[1]
+@dataclass(frozen=True)
+class Layout:
+    """Where the numbers of a packed layer are.
 
+    A layer is: its box of cells, bits more than the least, variant (or with joins: number of shapes), falloff, opacity; then its
+    shapes: (variant, join, smoothness,) colours, places. With joins all shapes of a layer are as long as the longest could be.
+    """
 
-def _known(low: tuple[float, float], box: tuple[float, float]) -> dict[Expr, Expr]:
-    names = (*components_of(CORNER), *components_of(BOX))
-    return dict(zip(names, map(const, (*low, *box)), strict=True))
+    variants: tuple[Variant, ...]
+    joins: tuple[str, ...]
 
+    @property
+    def variant_bits(self) -> int:
+        return (len(self.variants) - 1).bit_length() if self.variants else 0
 
-class _Coder:
-    """Collects whole numbers with their bits; each method returns the value that its number says."""
+    @property
+    def join_bits(self) -> int:
+        return (len(self.joins) - 1).bit_length() if self.joins else 0
 
-    def __init__(self) -> None:
-        self.numbers: list[tuple[int, int]] = []
+    @property
+    def head(self) -> int:
+        """Bits before the falloff."""
+        return 4 * CELL_BITS + CHOICE_BITS + (COUNT_BITS if self.joins else self.variant_bits)
 
-    def whole(self, value: int, bits: int) -> int:
-        self.numbers.append((value, bits))
-        return value
+    def before_shapes(self, precision: Precision) -> int:
+        """Bits before the first shape."""
+        return self.head + precision.falloff + precision.opacity
 
-    def linear(self, value: float, limits: tuple[float, float], bits: int) -> float:
-        low, high = limits
-        fraction = (value - low) / (high - low) if high > low else 0.0
-        return low + (high - low) * self._fraction(fraction, bits)
+    def before_numbers(self, precision: Precision) -> int:
+        """Bits of a shape before its colours."""
+        return self.variant_bits + self.join_bits + precision.falloff if self.joins else 0
 
-    def root(self, value: float, largest: float, bits: int) -> float:
-        fraction = (value / largest) ** 0.25 if largest else 0.0
-        return largest * self._fraction(fraction, bits) ** 4
+    def counts(self, variant: Variant) -> tuple[int, int]:
+        """How many fractions of a shape have the colours' precision, and how many that of places."""
+        parameters = (*PAINTS[variant.paint].parameters, *KINDS[variant.kind].parameters)
+        places = sum(p.width for p in parameters if p.unit.codec.precision == PLACE)
+        return sum(p.width for p in parameters) - places, places
 
-    def _fraction(self, fraction: float, bits: int) -> float:
-        most = (1 << bits) - 1
-        return self.whole(round(min(max(fraction, 0.0), 1.0) * most), bits) / most
+    def most(self) -> tuple[int, int]:
+        """The most of either that any variant has."""
+        counts = [self.counts(variant) for variant in self.variants]
+        return max((c for c, _ in counts), default=0), max((p for _, p in counts), default=1)
+
+    def longest(self, precision: Precision, count: int) -> int:
+        """Bits of the longest shape whose places have so many."""
+        colors, places = self.most()
+        return self.before_numbers(precision) + colors * precision.color + places * count
 
 
 class _Stream:
@@ -451,15 +439,15 @@ class _Stream:
         self._value |= value << self.bits
         self.bits += bits
 
-    def words(self) -> tuple[int, ...]:
-        """All words, and enough empty ones that a shader may read ahead."""
-        count = -(-self.bits // WORD) + AHEAD
+    def words(self, ahead: int) -> tuple[int, ...]:
+        """All words, and so many empty ones that a shader may read ahead."""
+        count = -(-self.bits // WORD) + ahead
         raw = self._value
         mask = (1 << WORD) - 1
         return tuple((raw >> (WORD * i)) & mask for i in range(count))
 
 
-AHEAD = 16  # more than the longest shape has fractions
+AHEAD = 4  # words that a shader may read beyond a shape
 
 
 def joined(numbers: Sequence[int], bits: int, per: int) -> list[int]:
@@ -489,91 +477,3 @@ def _rounded(value: float) -> float:
 
 def _rounded_down(value: float) -> float:
     return math.floor(value * 1e4) / 1e4 if value > 1.0 else value
-
-
-# --- reading it in a shader ---------------------------------------------------------------------------------
-
-
-class PackedText:
-    """The parts of a shader that read a packed scene."""
-
-    def __init__(self, scene: Scene, packed: Packed, dialect: Dialect) -> None:
-        self.packed, self.dialect = packed, dialect
-        self.kinds = [k for k in KINDS if any(layer.kind == k for layer in scene.layers)]
-        self.unions = any(len(layer.shapes) > 1 for layer in scene.layers)
-        self.distances = [distance(kind, packed.ranges) for kind in self.kinds]
-
-    def part(self) -> dict[str, Any]:
-        """What the template takes."""
-        packed, bits = self.packed, self.packed.precision
-        low, high = var("low", VEC2), var("high", VEC2)
-        corner = vec2(*map(const, packed.grid.low)) + low * (1.0 / packed.grid.per_unit)
-        values = {
-            "place": (P - vec2(*map(const, packed.grid.low))) * packed.grid.per_unit,
-            "corner": corner,
-            "box": (high - low) * (1.0 / packed.grid.per_unit),
-            "tint": linear_vector(var("tint", VEC3), packed.ranges.color),
-        }
-        return {
-            **{name: expression(value, self.dialect) for name, value in values.items()},
-            **self._fields(),
-            "words": packed.words,
-            "word": WORD,
-            "end": packed.bits,
-            "cell": CELL_BITS,
-            "choice": CHOICE_BITS,
-            "least": packed.least,
-            "color": bits.color,
-            "most": max(map(fraction_count, self.kinds), default=1),
-            "union": self.unions,
-            "kinds": [
-                (kind, expression(value, self.dialect))
-                for kind, value in zip(self.kinds, self.distances, strict=True)
-            ],
-        }
-
-    def _fields(self) -> dict[str, str | int]:
-        """Where a layer's own numbers are, and what they mean."""
-        bits, ranges = self.packed.precision, self.packed.ranges
-        place = 4 * CELL_BITS + CHOICE_BITS
-        fields: dict[str, str | int] = {}
-
-        def head(width: int) -> str:
-            """A whole number in the first word."""
-            nonlocal place
-            place += width
-            return f"head >> {place - width} & {(1 << width) - 1}"
-
-        def part(width: int) -> Expr:
-            nonlocal place
-            place += width
-            return var(f"part(start + {place - width}, {width})")
-
-        if len(self.kinds) > 1:
-            fields["kind"] = head(KIND_BITS)
-        if self.unions:
-            fields["count"] = head(UNION_BITS)
-        assert place <= WORD
-        fields["falloff"] = self._say(grown(part(bits.falloff), ranges.falloff))
-        fields["opacity"] = self._say(linear(part(bits.opacity), ranges.opacity))
-        if self.unions:
-            fields["smoothness"] = self._say(grown(part(bits.falloff), ranges.smoothness))
-        most = max(map(fraction_count, self.kinds), default=1)
-        longest = WORD + place + 3 * bits.color + most * (self.packed.least + 2**CHOICE_BITS - 1)
-        return fields | {"head": place, "size": self._shape_bits(), "window": -(-longest // WORD) + 1}
-
-    def _say(self, value: Expr) -> str:
-        return expression(value, self.dialect)
-
-    def _shape_bits(self) -> str:
-        """Bits of one shape, of its kind and `n`."""
-        colors = 3 * self.packed.precision.color
-        *others, last = [f"{fraction_count(kind)} * n" for kind in self.kinds]
-        chosen = "".join(f"kind == {i} ? {text} : " for i, text in enumerate(others)) + last
-        return f"{colors} + ({chosen})" if others else f"{chosen} + {colors}"
-
-
-def linear_vector(v: Expr, limits: tuple[float, float]) -> Expr:
-    """`linear` for three fractions."""
-    low, high = limits
-    return v if limits == (0.0, 1.0) else vec3(low) + v * (high - low)

@@ -1,72 +1,163 @@
 """A scene as records of numbers, one a shape, which a shader reads in a loop.
 
-What a distance computes from its parameters alone (the cosine of an angle, say) is in the record.
+What a shape's formulas compute from its parameters alone (the cosine of an angle, say) is in the record.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from functools import cache
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ..expr import VEC2, VEC4, Expr, component, const, constant, hoist, scalarize, substitute, var, vec2
+from ..blend import COMPOSITING, JOINS
+from ..expr import (
+    VEC4,
+    VECTOR,
+    Expr,
+    component,
+    const,
+    constant,
+    hoist,
+    operation,
+    scalarize,
+    select,
+    substitute,
+    var,
+    vec3,
+)
+from ..layer import PIXEL, STILL, P, cover_of, shape_at
+from ..paints import FLAT, PAINTS
 from ..scene import Layer, Scene, Shape
 from ..shapes import KINDS
 
 Floats = NDArray[np.float32]
 
-P = var("p", VEC2)
-FALLOFF = 4  # place of the falloff in a record; before it are colour and opacity
-UNION, SMOOTHNESS = 5, 6  # in scenes with unions
+OPACITY, FALLOFF, COUNT, SMOOTHNESS, JOIN = range(5)  # places in a record; the last three in scenes with joins
+BELOW, FIELD, OTHER = var("c", VEC4), var("s", VEC4), var("o", VEC4)  # of a loop: what is below, a layer, its next shape
+HEAD, OWN = "r0", "q0"  # the first vec4 of a layer's record, and of the record of a shape that is joined to it
+
+
+class Variant(NamedTuple):
+    """What decides the formula of one shape: names of its kind and its paint."""
+
+    kind: str
+    paint: str = FLAT
+
+    @property
+    def expression(self) -> Expr:
+        """Colour and field of a shape at the point `p`, in variables."""
+        kind, paint = KINDS[self.kind], PAINTS[self.paint]
+        return shape_at(kind, paint, kind.variables(), [p.variable() for p in paint.parameters])
+
+    @property
+    def scalars(self) -> tuple[Expr, ...]:
+        """The float variables of its numbers: the paint's, then the kind's."""
+        painted = (scalar for parameter in PAINTS[self.paint].parameters for scalar in parameter.scalars())
+        return (*painted, *KINDS[self.kind].scalars())
+
+
+def variant_of(shape: Shape) -> Variant:
+    return Variant(shape.kind, shape.paint)
+
+
+def variants_of(scene: Scene) -> tuple[Variant, ...]:
+    """All that a scene has, in the order of KINDS; patches last."""
+    found = {variant_of(shape) for layer in scene.layers for shape in layer.shapes}
+    places = list(KINDS)
+    return tuple(sorted(found, key=lambda v: (KINDS[v.kind].patch is not None, places.index(v.kind), v.paint)))
+
+
+def joins_of(scene: Scene) -> tuple[str, ...]:
+    """The joins that a scene has, in the order of JOINS."""
+    found = {joint.join for layer in scene.layers for joint in layer.joints}
+    return tuple(name for name in JOINS if name in found)
 
 
 @dataclass(frozen=True)
 class Form:
-    """What the records of a scene hold: `kinds` by their number, and whether there are unions.
+    """What the records of a scene hold: its variants, its joins by their number, and its compositing.
 
-    A record is: colour (3), opacity, falloff, (union size, smoothness,) (kind,) parameters; in vec4s r0, r1, …
+    A record is: opacity, falloff, (shapes in its layer, smoothness, join,) (variant,) numbers; in vec4s r0, r1, …
     """
 
-    kinds: tuple[str, ...]
-    unions: bool
+    variants: tuple[Variant, ...]
+    joins: tuple[str, ...]
+    compositing: str
 
     @property
-    def kind_place(self) -> int:
-        return SMOOTHNESS + 1 if self.unions else FALLOFF + 1
+    def variant_place(self) -> int:
+        """Where the number of the variant is."""
+        return JOIN + 1 if self.joins else FALLOFF + 1
 
     @property
     def head(self) -> int:
-        """How many numbers come before the parameters."""
-        return self.kind_place + (len(self.kinds) > 1)
+        """How many numbers come before those of the formulas."""
+        return self.variant_place + (len(self.variants) > 1)
 
     @property
     def stride(self) -> int:
         """How many vec4 a record has."""
-        widest = max((_tabulated(kind).width for kind in self.kinds), default=0)
+        widest = max((_tabulated(variant).width for variant in self.variants), default=0)
         return -(-(self.head + widest) // 4)
 
-    def distances(self) -> list[tuple[str, Expr]]:
-        """Distance by kind, of a point `p` and the rows r1, r2, … of a record."""
-        return [(kind, _tabulated(kind).distance(self.head)) for kind in self.kinds]
+    def fields(self) -> list[tuple[Variant, Expr]]:
+        """Colour and field by variant, of the point `p` and the rows r0, r1, … of a record."""
+        return [(variant, _tabulated(variant).field(self.head)) for variant in self.variants]
 
-    def slot(self, place: int) -> str:
-        """How a shader says the number at a place of a record."""
-        return f"r{place // 4}.{'xyzw'[place % 4]}"
+    def joined(self) -> Expr:
+        """A layer so far (`s`) with its next shape (`o`), whose record begins with `q0`, `q1`."""
+        return joined_by(self.joins, slot(JOIN, OWN), slot(SMOOTHNESS, OWN))
+
+    def drawn(self, motion: Expr = STILL) -> Expr:
+        """What a layer `s` whose record begins with `r0` makes of what is below it, `c`."""
+        return drawn_by(self, slot(self.variant_place, HEAD), slot(OPACITY), slot(FALLOFF), motion)
+
+
+def slot(place: int, row: str = HEAD) -> Expr:
+    """The number at a place of a record whose first vec4 is called `row`."""
+    return component(var(f"{row[0]}{place // 4}", VEC4), place % 4)
+
+
+def joined_by(joins: Sequence[str], which: Expr, smoothness: Expr) -> Expr:
+    """The layer `s` with a shape `o` joined to it, by the join of a number."""
+    found = [JOINS[name].formula(FIELD, OTHER, smoothness) for name in joins]
+    return _by_number(which, found)
+
+
+def drawn_by(form: Form, which: Expr, opacity: Expr, falloff: Expr, motion: Expr = STILL) -> Expr:
+    """What a layer `s` that begins with the variant of a number makes of `c`; `motion` is added to distances."""
+    covers = []
+    for variant in form.variants:
+        kind = KINDS[variant.kind]
+        covers.append(
+            cover_of(kind, FIELD.w + motion if kind.patch is None else FIELD.w, falloff, form.compositing)
+        )
+    color = vec3(FIELD.x, FIELD.y, FIELD.z)
+    return COMPOSITING[form.compositing].draw(BELOW, color, opacity, _by_number(which, covers))
+
+
+def _by_number(which: Expr, choices: Sequence[Expr]) -> Expr:
+    """The choice of a number; runs of equal ones are told apart from others only."""
+    found = choices[-1] if choices else const(0.0)
+    for number in range(len(choices) - 2, -1, -1):
+        if choices[number] is not choices[number + 1]:
+            found = select(which < number + 0.5, choices[number], found)
+    return found
 
 
 def form_of(scene: Scene) -> Form:
     """The records that a scene needs."""
-    present = {layer.kind for layer in scene.layers}
-    return Form(tuple(k for k in KINDS if k in present), any(len(layer.shapes) > 1 for layer in scene.layers))
+    return Form(variants_of(scene), joins_of(scene), scene.compositing)
 
 
 def records(scene: Scene, form: Form) -> Floats:
     """All records, [shapes, stride, 4]."""
     table = np.zeros((scene.shape_count, form.stride * 4), np.float32)
-    rows = (_record(layer, shape, form) for layer in scene.layers for shape in layer.shapes)
+    rows = (row for layer in scene.layers for row in _records(layer, form))
     for place, row in enumerate(rows):
         table[place, : len(row)] = row
     return table.reshape(scene.shape_count, form.stride, 4)
@@ -77,43 +168,46 @@ def first_records(layers: Sequence[Layer]) -> NDArray[np.int64]:
     return np.cumsum([0, *(len(layer.shapes) for layer in layers)], dtype=np.int64)[:-1]
 
 
-def _record(layer: Layer, shape: Shape, form: Form) -> list[float]:
-    row = [*shape.color, layer.opacity, layer.falloff]
-    row += [len(layer.shapes), layer.smoothness] if form.unions else []
-    row += [form.kinds.index(shape.kind)] if len(form.kinds) > 1 else []
-    return [*row, *_tabulated(shape.kind).values(shape)]
+def _records(layer: Layer, form: Form) -> Iterator[list[float]]:
+    joints = [(0.0, 0), *((joint.smoothness, form.joins.index(joint.join)) for joint in layer.joints)]
+    for shape, joint in zip(layer.shapes, joints, strict=True):
+        row = [layer.opacity, layer.falloff]
+        row += [len(layer.shapes), *joint] if form.joins else []
+        row += [form.variants.index(variant_of(shape))] if len(form.variants) > 1 else []
+        yield [*row, *_tabulated(variant_of(shape)).values(shape)]
 
 
-def record_scalars(kind: str) -> list[Expr]:
-    """The numbers of a record after its head, as expressions of the kind's scalars."""
-    return _tabulated(kind).scalars
+def record_scalars(variant: Variant) -> list[Expr]:
+    """The numbers of a record after its head, as expressions of the variant's scalars."""
+    return _tabulated(variant).scalars
 
 
 class _Tabulated:
-    """A kind's distance with all that does not depend on the point read from a record."""
+    """A variant's formula with all that depends neither on the point nor on the pixels read from a record."""
 
-    def __init__(self, kind: str) -> None:
-        self._symbolic = KINDS[kind].distance(P, *KINDS[kind].variables())
-        self._parts = hoist(self._symbolic, P)
+    def __init__(self, variant: Variant) -> None:
+        self._symbolic, self._inputs = variant.expression, variant.scalars
+        self._parts = hoist(self._symbolic, (P, PIXEL))
         self.scalars = [scalar for part in self._parts for scalar in scalarize(part)]
-        self._inputs = KINDS[kind].scalars()
         self.width = len(self.scalars)
 
-    def distance(self, start: int) -> Expr:
-        """The distance, its numbers from place `start` of a record on."""
-        slots = (component(var(f"r{i // 4}", VEC4), i % 4) for i in range(start, start + self.width))
-        return substitute(self._symbolic, {part: _take(part, slots) for part in self._parts})
+    def field(self, start: int) -> Expr:
+        """The formula, its numbers from place `start` of a record on."""
+        places = iter(range(start, start + self.width))
+        return substitute(self._symbolic, {part: _take(part, places) for part in self._parts})
 
     def values(self, shape: Shape) -> list[float]:
         """The numbers of a shape's record."""
-        values = dict(zip(self._inputs, map(const, shape.parameters), strict=True))
+        numbers = (*shape.color, *shape.paint_parameters, *shape.parameters)
+        values = dict(zip(self._inputs, map(const, numbers), strict=True))
         return [constant(substitute(scalar, values)) for scalar in self.scalars]
 
 
 @cache
-def _tabulated(kind: str) -> _Tabulated:
-    return _Tabulated(kind)
+def _tabulated(variant: Variant) -> _Tabulated:
+    return _Tabulated(variant)
 
 
-def _take(part: Expr, slots: Iterator[Expr]) -> Expr:
-    return vec2(next(slots), next(slots)) if part.type is VEC2 else next(slots)
+def _take(part: Expr, places: Iterable[int]) -> Expr:
+    found = [slot(place) for _, place in zip(range(part.type.width), places, strict=False)]
+    return found[0] if len(found) == 1 else operation(VECTOR[len(found)].value, *found)

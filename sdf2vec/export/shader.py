@@ -11,27 +11,15 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..blend import (
-    BREATH,
-    COMPOSITING,
-    FRAMINGS,
-    breath,
-    coverage,
-    display,
-    grid_point,
-    smooth_union,
-    surface_point,
-    union_distance,
-    union_weight,
-)
+from ..blend import BREATH, COMPOSITING, FRAMINGS, breath, display, grid_point, surface_point
 from ..errors import Sdf2vecError
-from ..expr import VEC2, VEC4, Expr, const, var, vec2, vec3, vec4
+from ..expr import VEC2, VEC4, Expr, const, var, vec2, vec4
+from ..layer import PIXEL, STILL, Formula, P, constant_row
 from ..lower.shader import GLSL, WGSL, Dialect, definition, expression, literal, statements, used_functions
-from ..scene import Layer, Scene, Shape
-from ..shapes import KINDS
+from ..paints import FLAT
+from ..scene import Layer, Scene
 from ..templating import template
 from . import packing
-from .constants import constants
 from .layouts import (
     EMBEDDED,
     FILE,
@@ -46,10 +34,10 @@ from .layouts import (
     choose,
 )
 from .options import GLSL_VERSIONS, Options
-from .records import Form, P, first_records, form_of, records
+from .packed_text import PackedText
+from .records import BELOW, COUNT, JOIN, OWN, Form, first_records, form_of, records, slot
 from .tiles import COARSEST, Tiles
 
-BELOW, PIXEL, D = var("c", VEC4), var("pixel"), var("d")
 DATA_WIDTH = 256  # texels in a row of a data texture
 
 Floats = NDArray[np.float32]
@@ -114,7 +102,6 @@ def shader(scene: Scene, name: str, options: Options) -> Shader:
         background=expression(_background(scene), target.dialect),
         version=GLSL_VERSIONS[options.glsl],
         output="gl_FragColor" if options.glsl == "es100" else "fragColor",
-        motion=_motion(target, options),
         display="" if job.is_displayable else "display",
         place=expression(surface_point(var(target.surface, VEC2), _size(scene)), target.dialect),
         **(dict.fromkeys(("table", "packed", "tiles", "data")) | {"layers": []} | parts),
@@ -153,13 +140,6 @@ def _moves(target: Target, options: Options) -> bool:
     return options.animate
 
 
-def _motion(target: Target, options: Options) -> str:
-    """What is added to a distance in a loop over shapes i."""
-    if not options.animate:
-        return ""
-    return f" + {expression(breath(var(target.time), var('float(i)')), target.dialect)}"
-
-
 @dataclass(frozen=True)
 class _Job:
     """What the body of a shader is made from."""
@@ -174,11 +154,17 @@ class _Job:
     def dialect(self) -> Dialect:
         return self.target.dialect
 
+    def motion(self, index: Expr) -> Expr:
+        """What is added to the distance of the layer whose first shape has an index."""
+        return breath(var(self.target.time), index) if self.slack else STILL
+
+    def say(self, expr: Expr) -> str:
+        return expression(expr, self.dialect)
+
     def functions(self, roots: Iterable[Expr]) -> str:
         """Definitions of all functions that the formulas and the frame around them call."""
-        moving = [breath(PIXEL, PIXEL)] if self.slack else []
         shown = [] if self.is_displayable else [display(BELOW)]
-        found = used_functions([*roots, *moving, *shown, *self._frame()])
+        found = used_functions([*roots, *shown, *self._frame()])
         brief = self.choice.layout == "packed"
         return ("\n" if brief else "\n\n").join(
             definition(f, self.dialect, documented=not brief) for f in found
@@ -187,8 +173,8 @@ class _Job:
     @property
     def is_displayable(self) -> bool:
         """Whether the scene's colours need no clamping: in the smallest text that is left out."""
-        opaque = self.scene.compositing == "over" and self.scene.background is not None
-        return self.choice.layout == "packed" and opaque
+        within = not COMPOSITING[self.scene.compositing].signed and self.scene.background is not None
+        return self.choice.layout == "packed" and within
 
     def _frame(self) -> list[Expr]:
         """From a pixel, or a place on a surface, to a point."""
@@ -207,12 +193,6 @@ def _background(scene: Scene) -> Expr:
     return vec4(*(const(value) for value in values))
 
 
-def _loop_roots(scene: Scene, unions: bool) -> list[Expr]:
-    """What a loop over shapes calls besides their distances."""
-    blend = COMPOSITING[scene.compositing](BELOW, vec3(0.0), D, coverage(D, D, PIXEL))
-    return [blend, *([union_weight(D, D, D), union_distance(D, D, D)] if unions else [])]
-
-
 # --- readable: a line for every shape ----------------------------------------------------------------------
 
 
@@ -227,17 +207,9 @@ def _readable(job: _Job) -> dict[str, Any]:
 
 def _layer(layer: Layer, first: int, job: _Job) -> Expr:
     """The colour after this layer is laid on `c`."""
-    distances = [_distance(shape) for shape in layer.shapes]
-    colors = [vec3(*(const(channel) for channel in shape.color)) for shape in layer.shapes]
-    distance, color = smooth_union(distances, colors, const(layer.smoothness))
-    if job.slack:
-        distance = distance + breath(var(job.target.time), const(first))
-    cover = coverage(distance, const(layer.falloff), PIXEL)
-    return COMPOSITING[job.scene.compositing](BELOW, color, const(layer.opacity), cover)
-
-
-def _distance(shape: Shape) -> Expr:
-    return KINDS[shape.kind].distance(P, *constants(shape))
+    row = constant_row(layer.structure, layer.numbers)
+    formula = Formula(layer.structure, row, job.motion(const(first)))
+    return formula.draw(BELOW, job.scene.compositing)
 
 
 # --- records: a loop over a table, with or without lists ----------------------------------------------------
@@ -290,19 +262,33 @@ def data_array(rows: Floats, numbers: NDArray[np.int64]) -> Floats:
 
 
 def _loop(job: _Job, form: Form, tiles: Tiles | None = None) -> dict[str, Any]:
-    roots = [*(distance for _, distance in form.distances()), *_loop_roots(job.scene, form.unions)]
-    grid = [grid_point(P, P, P)] if tiles else []
-    return {"functions": job.functions([*roots, *grid])}
+    roots = [field for _, field in form.fields()]
+    roots += [form.drawn(job.motion(var("float(i)"))), *([form.joined()] if form.joins else [])]
+    return {"functions": job.functions([*roots, *([grid_point(P, P, P)] if tiles else [])])}
 
 
 def _table_part(job: _Job, form: Form) -> dict[str, Any]:
     return {
         "count": job.scene.shape_count,
+        **table_part(form, job.dialect, job.motion(var("float(i)"))),
+    }
+
+
+def table_part(form: Form, dialect: Dialect, motion: Expr = STILL) -> dict[str, Any]:
+    """What the template of a loop over records takes, whatever the scene."""
+    return {
         "stride": form.stride,
-        "union": form.unions,
-        "blend": COMPOSITING[job.scene.compositing].name,
-        "kind": form.slot(form.kind_place),
-        "kinds": [(kind, expression(distance, job.dialect)) for kind, distance in form.distances()],
+        "heads": range((form.head - 1) // 4 + 1),
+        "owns": range(JOIN // 4 + 1),
+        "own": OWN[0],
+        "shapes": expression(slot(COUNT), dialect),
+        "joined": expression(form.joined(), dialect) if form.joins else "",
+        "drawn": expression(form.drawn(motion), dialect),
+        "variant": expression(slot(form.variant_place), dialect),
+        "variants": [
+            (" ".join(word for word in variant if word != FLAT), expression(field, dialect))
+            for variant, field in form.fields()
+        ],
     }
 
 
@@ -346,22 +332,11 @@ def _ivec4s(numbers: list[int]) -> list[str]:
 # --- packed: a stream of bits -------------------------------------------------------------------------------
 
 
-@lru_cache(maxsize=8)
-def _packed_scene(scene: Scene, slack: float) -> packing.Packed:
-    return packing.pack(scene, slack)
-
-
 def _packed(job: _Job) -> dict[str, Any]:
-    packed = _packed_scene(job.scene, job.slack)
-    text = packing.PackedText(job.scene, packed, job.dialect)
-    roots = [
-        *text.distances,
-        *_loop_roots(job.scene, text.unions),
-        grid_point(P, P, P),
-        packing.grown(D, D),
-    ]
-    part = text.part() | {"blend": COMPOSITING[job.scene.compositing].name, "coarsest": literal(COARSEST)}
-    return {"functions": job.functions(roots), "packed": part, "error": packed.error}
+    packed = packing.pack(job.scene, job.slack)
+    text = PackedText(job.scene, packed, job.dialect, job.motion(var("float(i)")))
+    part = text.part() | {"coarsest": literal(COARSEST), "moving": bool(job.slack)}
+    return {"functions": job.functions([*text.roots, grid_point(P, P, P)]), "packed": part, "error": packed.error}
 
 
 _BODIES = {"readable": _readable, "table": _table, "tiled": _tiled, "packed": _packed, "data": _data}

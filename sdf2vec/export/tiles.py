@@ -10,17 +10,18 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from functools import cache
-from typing import TYPE_CHECKING
 
 import numpy as np
+import torch
 from numpy.typing import NDArray
 
+from ..blend import COMPOSITING
 from ..expr import components_of, var
+from ..layer import Formula, P, Structure
+from ..lower.torch import Tensors, compile_torch
+from ..render.fused import uniform_rows
+from ..render.tensors import Group, from_scene
 from ..scene import Scene
-
-if TYPE_CHECKING:
-    from ..lower.torch import Tensors
-    from ..render.tensors import Group
 
 Floats = NDArray[np.float64]
 Integers = NDArray[np.int64]
@@ -116,7 +117,8 @@ def bin_layers(scene: Scene, grid: Grid, slack: float = 0.0) -> Tiles:
     distances = layer_distances(scene, layers, grid.middles()[cells])
     around = bounds.slopes[layers] * (0.5 + MARGIN) * 2.0**0.5 / grid.per_unit
     seen = (distances - around < bounds.outer[layers]) | (~bounded & leaves[layers])
-    opaque = np.array([scene.compositing == "over" and layer.opacity == 1.0 for layer in scene.layers])
+    hiding = COMPOSITING[scene.compositing].hides
+    opaque = np.array([hiding and layer.opacity == 1.0 for layer in scene.layers])
     hides = bounded & opaque[layers] & (distances + around < bounds.inner[layers])
     lowest = np.zeros(grid.cells, np.int64)
     np.maximum.at(lowest, cells[hides], layers[hides])
@@ -137,53 +139,39 @@ def layer_bounds(scene: Scene, slack: float = 0.0) -> Bounds:
     """The bounds of all layers for pixels of at most `COARSEST`."""
     values = np.zeros((len(scene.layers), 7))
     for group, rows in _groups(scene):
-        measured = _measure(group.kind, group.union_size)(*rows, rows[0].new_tensor(slack))
-        values[group.order.numpy()] = np.stack([v.expand(len(group.order)).numpy() for v in measured], axis=1)
+        measured = _measure(group.structure)(*rows, rows[0].new_tensor(slack))
+        values[group.order.numpy()] = np.stack([v.expand(len(group)).numpy() for v in measured], axis=1)
     return Bounds(values[:, :4], values[:, 4], values[:, 5], values[:, 6])
 
 
 def layer_distances(scene: Scene, layers: Integers, points: Floats) -> Floats:
     """Distance of layer layers[i] at points[i]; [P], [P, 2] → [P]."""
-    import torch
-
     distances = np.zeros(len(layers))
     for group, rows in _groups(scene):
         place = np.full(len(scene.layers), -1)
-        place[group.order.numpy()] = np.arange(len(group.order))
+        place[group.order.numpy()] = np.arange(len(group))
         wanted = np.nonzero(place[layers] >= 0)[0]
         chosen = torch.from_numpy(place[layers[wanted]])
         x, y = torch.from_numpy(points[wanted]).T
-        (found,) = _distance(group.kind, group.union_size)(x, y, *(row[chosen] for row in rows))
+        (found,) = _distance(group.structure)(x, y, *(row[chosen] for row in rows))
         distances[wanted] = found.numpy()
     return distances
 
 
 def _groups(scene: Scene) -> Iterator[tuple[Group, Tensors]]:
     """Groups of like layers, and their uniforms in the order that `Formula.uniforms` says, each [G]."""
-    import torch
-
-    from ..render.fused import group_rows
-    from ..render.kernels import LOOK
-    from ..render.tensors import from_scene
-
     for group in from_scene(scene, torch.float64).groups:
-        yield group, group_rows(group, COARSEST).unbind(dim=1)[len(LOOK) :]
+        yield group, uniform_rows(group, COARSEST).unbind(dim=1)
 
 
 @cache
-def _measure(kind: str, union_size: int) -> Callable[..., Tensors]:
+def _measure(structure: Structure) -> Callable[..., Tensors]:
     """Box, outer and inner distance and slope of a layer from its uniforms and the slack."""
-    from ..lower.torch import compile_torch
-    from ..render.kernels import Formula, LayerKind
-
-    formula, slack = Formula(LayerKind(kind, union_size)), var("slack")
+    formula, slack = Formula.of(structure), var("slack")
     return compile_torch(formula.bounds(slack), [*formula.uniforms, slack])
 
 
 @cache
-def _distance(kind: str, union_size: int) -> Callable[..., Tensors]:
-    from ..lower.torch import compile_torch
-    from ..render.kernels import Formula, LayerKind
-
-    formula = Formula(LayerKind(kind, union_size))
-    return compile_torch([formula.distance], [*components_of(formula.point), *formula.uniforms])
+def _distance(structure: Structure) -> Callable[..., Tensors]:
+    formula = Formula.of(structure)
+    return compile_torch([formula.distance], [*components_of(P), *formula.uniforms])

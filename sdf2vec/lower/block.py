@@ -20,29 +20,29 @@ class Block:
 
 
 class Derivatives(NamedTuple):
-    """Derivatives of Σ seedᵢ·outputᵢ of a block.
+    """Derivatives of Σ cotangentᵢ·outputᵢ of a block.
 
     `sums` are added up over the pixels as the variables sum0, sum1, …; `uniforms` are computed from these once
     for the block, None where nothing depends on that uniform.
     """
 
-    seeds: tuple[Expr, ...]  # the variables seed0, seed1, …
+    cotangents: tuple[Expr, ...]  # the variables cotangent0, cotangent1, …
     sums: tuple[Expr, ...]
-    flows: tuple[Expr, ...]  # by the varying inputs that were asked for, pixel by pixel
+    carried: tuple[Expr, ...]  # by the varying inputs that were asked for, pixel by pixel
     uniforms: tuple[Expr | None, ...]
 
 
-def derivatives(block: Block, flows: Sequence[Expr] = ()) -> Derivatives:
+def derivatives(block: Block, carried: Sequence[Expr] = ()) -> Derivatives:
     """What depends on the pixel stays within the loop over pixels; the rest is chained after it."""
     outputs = without_divisions(block.outputs, block.varying)
     frontier = _frontier(outputs, dependent(outputs, block.varying))
-    seeds = tuple(var(f"seed{i}") for i in range(len(outputs)))
-    found = adjoints(_summed(outputs, seeds), leaves=set(frontier))
-    wanted = [found.get(node, const(0.0)) for node in (*frontier, *flows)]
-    inner = tuple(without_divisions(wanted, (*block.varying, *seeds)))
+    cotangents = tuple(var(f"cotangent{i}") for i in range(len(outputs)))
+    found = adjoints(_summed(outputs, cotangents), leaves=set(frontier))
+    wanted = [found.get(node, const(0.0)) for node in (*frontier, *carried)]
+    inner = tuple(without_divisions(wanted, (*block.varying, *cotangents)))
     outer = adjoints({node: var(f"sum{i}") for i, node in enumerate(frontier)})
     chained = tuple(outer.get(uniform) for uniform in block.uniforms)
-    return Derivatives(seeds, inner[: len(frontier)], inner[len(frontier) :], chained)
+    return Derivatives(cotangents, inner[: len(frontier)], inner[len(frontier) :], chained)
 
 
 def dependent(roots: Iterable[Expr], varying: Iterable[Expr]) -> set[Expr]:
@@ -67,11 +67,11 @@ def without_divisions(roots: Sequence[Expr], varying: Iterable[Expr]) -> list[Ex
     return [done[root] for root in roots]
 
 
-def _summed(outputs: Sequence[Expr], seeds: Sequence[Expr]) -> dict[Expr, Expr]:
+def _summed(outputs: Sequence[Expr], cotangents: Sequence[Expr]) -> dict[Expr, Expr]:
     """Seeds by output; outputs that are the same expression share theirs."""
     total: dict[Expr, Expr] = {}
-    for output, seed in zip(outputs, seeds, strict=True):
-        total[output] = total[output] + seed if output in total else seed
+    for output, cotangent in zip(outputs, cotangents, strict=True):
+        total[output] = total[output] + cotangent if output in total else cotangent
     return total
 
 

@@ -81,19 +81,22 @@ def fast_exp(x):
 '''
 
 
-def forward(block: Block, flows: Sequence[Expr] = ()) -> str:
+def forward(block: Block, carried: Sequence[Expr] = ()) -> str:
     """`def NAME(u, first, last, x, y, …, out0, …)`: fills the outputs for the pixels from `first` to before `last`.
 
-    With `flows`, as many varying inputs as there are outputs, `def NAME(u, first, last, x, y, …, kept0, …)`: each
-    output replaces its flow in place, and what was there before is kept in `kept`.
+    With `carried`, as many varying inputs as there are outputs, `def NAME(u, first, last, x, y, …, kept0, …)`: each
+    output replaces its carried_input in place, and what was there before is kept in `kept`.
     """
     outputs = without_divisions(block.outputs, block.varying)
     writer = _Writer(block)
-    inside = writer.body(outputs, keep=flows)
-    if flows:
-        targets = [f"kept{i}" for i in range(len(flows))]
-        inside += [f"        {to}[i] = {writer.names[flow]}" for to, flow in zip(targets, flows, strict=True)]
-        places = [str(flow.payload) for flow in flows]
+    inside = writer.body(outputs, keep=carried)
+    if carried:
+        targets = [f"kept{i}" for i in range(len(carried))]
+        inside += [
+            f"        {to}[i] = {writer.names[carried_input]}"
+            for to, carried_input in zip(targets, carried, strict=True)
+        ]
+        places = [str(carried_input.payload) for carried_input in carried]
     else:
         targets = places = [f"out{i}" for i in range(len(outputs))]
     inside += [
@@ -102,17 +105,17 @@ def forward(block: Block, flows: Sequence[Expr] = ()) -> str:
     return writer.function(block.name, [*writer.arrays, *targets], inside)
 
 
-def backward(block: Block, flows: Sequence[Expr] = ()) -> str:
-    """`def NAME_backward(u, first, last, x, y, …, seed0, …, grad)`: the derivatives of Σ seedᵢ·outputᵢ.
+def backward(block: Block, carried: Sequence[Expr] = ()) -> str:
+    """`def NAME_backward(u, first, last, x, y, …, cotangent0, …, grad)`: the derivatives of Σ cotangentᵢ·outputᵢ.
 
-    Those by the uniforms are added to `grad`. With `flows`, as many varying inputs as there are outputs, those by
-    each of these replace its seed in place.
+    Those by the uniforms are added to `grad`. With `carried`, as many varying inputs as there are outputs, those by
+    each of these replace its cotangent in place.
     """
-    found = derivatives(block, flows)
-    writer = _Writer(block, found.seeds)
-    inside = writer.body((*found.sums, *found.flows))
+    found = derivatives(block, carried)
+    writer = _Writer(block, found.cotangents)
+    inside = writer.body((*found.sums, *found.carried))
     inside += [f"        sum{i} += {writer.names[node]}" for i, node in enumerate(found.sums)]
-    inside += [f"        seed{i}[i] = {writer.names[node]}" for i, node in enumerate(found.flows)]
+    inside += [f"        cotangent{i}[i] = {writer.names[node]}" for i, node in enumerate(found.carried)]
     zeros = [f"    sum{i} = ZERO" for i in range(len(found.sums))]
     chained = writer.chain(found.uniforms)
     return writer.function(f"{block.name}_backward", [*writer.arrays, "grad"], inside, zeros, chained)
@@ -132,9 +135,9 @@ def scalar(name: str, outputs: Sequence[Expr], inputs: Sequence[Expr], uniforms:
 class _Writer:
     """Names nodes and writes assignments; nodes that do not depend on the pixel go before the loop."""
 
-    def __init__(self, block: Block, seeds: Sequence[Expr] = ()) -> None:
+    def __init__(self, block: Block, cotangents: Sequence[Expr] = ()) -> None:
         self.block = block
-        self.pixelwise = (*block.varying, *seeds)
+        self.pixelwise = (*block.varying, *cotangents)
         self.arrays = [str(variable.payload) for variable in self.pixelwise]
         self.names: dict[Expr, str] = {variable: f"{variable.payload}_i" for variable in self.pixelwise}
         self.names |= {uniform: f"u{i}" for i, uniform in enumerate(block.uniforms)}

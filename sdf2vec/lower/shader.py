@@ -163,6 +163,8 @@ def _print_component(expr: Expr, dialect: Dialect, names: dict[Expr, str]) -> tu
 
 def _print_operation(expr: Expr, dialect: Dialect, names: dict[Expr, str]) -> tuple[str, int]:
     cell = dialect.cell(OPERATIONS[expr.op])
+    if (swizzle := _swizzled(expr)) is not None:
+        return f"{_bound(swizzle, CALL, dialect, names)}.{COMPONENTS[: len(expr.args)]}", CALL
     if "{*}" in cell.text:
         return cell.text.replace("{*}", _arguments(expr, dialect, names)), CALL
     if cell.precedence == CALL:
@@ -171,6 +173,15 @@ def _print_operation(expr: Expr, dialect: Dialect, names: dict[Expr, str]) -> tu
     needed = max(cell.precedence, cell.operands)
     parts = [_bound(arg, needed + (i > 0), dialect, names) for i, arg in enumerate(expr.args)]
     return cell.text.format(*parts), cell.precedence
+
+
+def _swizzled(expr: Expr) -> Expr | None:
+    """The vector of which a joined one takes the first components."""
+    parts = [arg.payload if arg.op == "component" else None for arg in expr.args]
+    if not expr.op.startswith("vec") or parts != list(range(expr.type.width)):
+        return None
+    bases = {arg.args[0] for arg in expr.args}
+    return bases.pop() if len(bases) == 1 else None
 
 
 def _bound(expr: Expr, precedence: int, dialect: Dialect, names: dict[Expr, str]) -> str:

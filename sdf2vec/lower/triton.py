@@ -30,19 +30,19 @@ def forward(block: Block, rows: bool = False) -> str:
     return _function(block.name, [*_uniforms(block, rows), *map(_name, block.varying)], lines)
 
 
-def backward(block: Block, flows: Sequence[Expr] = (), rows: bool = False) -> str:
-    """`def NAME_backward(uniform, …, varying, …, seed0, …)`: the derivatives of Σ seedᵢ·outputᵢ.
+def backward(block: Block, carried: Sequence[Expr] = (), rows: bool = False) -> str:
+    """`def NAME_backward(uniform, …, varying, …, cotangent0, …)`: the derivatives of Σ cotangentᵢ·outputᵢ.
 
-    Returns a tuple: those by the varying inputs named in `flows`, pixel by pixel, then those by the uniforms. With
-    `rows`, `def NAME_backward(u, varying, …, seed0, …, grad)`: the latter are written to the row `grad` instead.
+    Returns a tuple: those by the varying inputs named in `carried`, pixel by pixel, then those by the uniforms. With
+    `rows`, `def NAME_backward(u, varying, …, cotangent0, …, grad)`: the latter are written to the row `grad` instead.
     """
-    found = derivatives(block, flows)
+    found = derivatives(block, carried)
     writer = _Writer()
-    lines = [*_loads(block, rows), *writer.lines((*found.sums, *found.flows)), *_sums(found.sums, writer)]
+    lines = [*_loads(block, rows), *writer.lines((*found.sums, *found.carried)), *_sums(found.sums, writer)]
     by_uniforms = [const(0.0) if node is None else node for node in found.uniforms]
     lines += writer.lines(by_uniforms)
     spelled = [writer.spelled(node) for node in by_uniforms]
-    returned = [writer.spelled(node) for node in found.flows]
+    returned = [writer.spelled(node) for node in found.carried]
     if rows:
         lines += [f"tl.store(grad + {i}, {value})" for i, value in enumerate(spelled)]
     else:
@@ -51,7 +51,7 @@ def backward(block: Block, flows: Sequence[Expr] = (), rows: bool = False) -> st
         lines.append(f"return {', '.join(returned)}")
     inputs = [
         *_uniforms(block, rows),
-        *map(_name, (*block.varying, *found.seeds)),
+        *map(_name, (*block.varying, *found.cotangents)),
         *(["grad"] if rows else []),
     ]
     return _function(f"{block.name}_backward", inputs, lines)
@@ -68,7 +68,7 @@ def _loads(block: Block, rows: bool) -> list[str]:
 
 
 def _sums(nodes: Sequence[Expr], writer: _Writer) -> list[str]:
-    """Sums over the block, each taken once. Every derivative has a seed, which is pixelwise, unless it is 0."""
+    """Sums over the block, each taken once. Every derivative has a cotangent, which is pixelwise, unless it is 0."""
     lines, done = [], dict[Expr, str]()
     for i, node in enumerate(nodes):
         summed = _name(node) if node.op == "const" else f"tl.sum({writer.spelled(node)}, 0)"

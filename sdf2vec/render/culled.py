@@ -12,8 +12,8 @@ import torch
 from torch.utils.checkpoint import checkpoint
 
 from ..lower.torch import Tensors, compile_torch
-from .fused import group_rows
-from .kernels import LOOK, Formula, LayerKind
+from ..layer import Formula, Structure
+from .fused import uniform_rows
 from .reference import canvas, composite_points
 from .tensors import Group, SceneTensors
 
@@ -70,12 +70,11 @@ def _touching(box: torch.Tensor, left: float, top: float, right: float, bottom: 
 @torch.no_grad()
 def _boxes(group: Group, pixel: float) -> torch.Tensor:
     """The boxes outside of which a group's layers cover nothing, [G, 4], on the CPU."""
-    columns = group_rows(group, pixel)[:, len(LOOK) :].unbind(1)
-    low_x, low_y, high_x, high_y, *_ = _bounds(group.kind, group.union_size)(*columns)
+    low_x, low_y, high_x, high_y, *_ = _bounds(group.structure)(*uniform_rows(group, pixel).unbind(1))
     return torch.stack([low_x, low_y, high_x, high_y], dim=1).cpu()
 
 
 @cache
-def _bounds(kind: str, union_size: int) -> Callable[..., Tensors]:
-    formula = Formula(LayerKind(kind, union_size))
+def _bounds(structure: Structure) -> Callable[..., Tensors]:
+    formula = Formula.of(structure)
     return compile_torch(formula.bounds(), formula.uniforms)

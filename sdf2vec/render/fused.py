@@ -21,8 +21,10 @@ import torch
 from numpy.typing import NDArray
 from torch.autograd.function import once_differentiable
 
+from ..blend import COMPOSITING
+from ..layer import Structure
 from . import kernels
-from .kernels import TILE, LayerKind
+from .kernels import TILE
 from .reference import canvas_axes
 from .tensors import Group, SceneTensors
 
@@ -46,11 +48,13 @@ def composite(tensors: SceneTensors, width: int, height: int, channels: int = 4)
 def _canvas(tensors: SceneTensors, width: int, height: int, channels: int) -> tuple[_Canvas, torch.Tensor]:
     """What a render needs, and the layers' rows of numbers in draw order."""
     axes = canvas_axes(tensors, -(-width // TILE) * TILE, -(-height // TILE) * TILE, width, height)
-    kinds = kinds_of(tensors)
-    module = kernels.load(kinds, tensors.compositing, channels)
+    structures = structures_of(tensors)
+    module = kernels.load(structures, tensors.compositing, channels)
     order = _draw_order(tensors)
-    index = np.repeat(np.arange(len(kinds)), [len(group.order) for group in tensors.groups])[order.numpy()]
-    canvas = _Canvas(module, index, channels, width, height, *axes, hides=tensors.compositing == "over")
+    index = np.repeat(np.arange(len(structures)), list(map(len, tensors.groups)))[order.numpy()]
+    canvas = _Canvas(
+        module, index, channels, width, height, *axes, hides=COMPOSITING[tensors.compositing].hides
+    )
     return canvas, rows_of(tensors.groups, float(axes[2]))[order]
 
 
@@ -59,14 +63,14 @@ def _draw_order(tensors: SceneTensors) -> torch.Tensor:
     return torch.cat([group.order for group in tensors.groups]).argsort()
 
 
-def kinds_of(tensors: SceneTensors) -> tuple[LayerKind, ...]:
-    """The kinds of layer in a scene, one for each group."""
-    return tuple(LayerKind(group.kind, group.union_size) for group in tensors.groups)
+def structures_of(tensors: SceneTensors) -> tuple[Structure, ...]:
+    """The structure of each group's layers."""
+    return tuple(group.structure for group in tensors.groups)
 
 
 def is_compiled(tensors: SceneTensors, channels: int) -> bool:
     """Whether the kernels for this scene are there; if not, the first render takes some seconds."""
-    return not tensors.groups or kernels.is_compiled(kinds_of(tensors), tensors.compositing, channels)
+    return not tensors.groups or kernels.is_compiled(structures_of(tensors), tensors.compositing, channels)
 
 
 @contextmanager
@@ -95,20 +99,15 @@ def extents_of(tensors: SceneTensors, width: int, height: int) -> tuple[torch.Te
 
 
 def rows_of(groups: list[Group], pixel: float) -> torch.Tensor:
-    """One row of numbers a layer, [L, widest]: `kernels.LOOK`, then `kernels.Formula.uniforms`."""
-    rows = [group_rows(group, pixel) for group in groups]
+    """One row of numbers a layer, [L, widest]: `layer.Formula.uniforms`."""
+    rows = [uniform_rows(group, pixel) for group in groups]
     widest = max(row.shape[1] for row in rows)
     return torch.cat([torch.nn.functional.pad(row, (0, widest - row.shape[1])) for row in rows])
 
 
-def group_rows(group: Group, pixel: float) -> torch.Tensor:
-    """One row of numbers for each layer of a group, [G, U]: `kernels.LOOK`, then `kernels.Formula.uniforms`."""
-    shapes = torch.cat(list(group.parameters.values()), dim=2).flatten(1)  # [G, K·P], shape by shape
-    pixels = torch.full_like(group.falloff, pixel)
-    head = [group.colors[:, 0], *(x[:, None] for x in (group.opacity, pixels, group.falloff))]
-    if group.union_size == 1:
-        return torch.cat([*head, shapes], dim=1)
-    return torch.cat([*head, group.smoothness[:, None], shapes, group.colors.flatten(1)], dim=1)
+def uniform_rows(group: Group, pixel: float) -> torch.Tensor:
+    """One row of numbers for each layer of a group, [G, U]: `layer.Formula.uniforms`."""
+    return torch.cat([torch.full_like(group.opacity, pixel), *group.values.values()], dim=1)
 
 
 @dataclass(frozen=True)
@@ -172,12 +171,12 @@ class _Composite(torch.autograd.Function):
 
     @staticmethod
     @once_differentiable
-    def backward(ctx: Any, seed: torch.Tensor) -> tuple[torch.Tensor | None, ...]:
+    def backward(ctx: Any, cotangent: torch.Tensor) -> tuple[torch.Tensor | None, ...]:
         canvas, bins = ctx.canvas, ctx.bins
         width, longest = ctx.shared[4].shape[1], int(np.diff(bins.starts).max(initial=0))
         grads = np.zeros((len(bins.layers), width), np.float32)
         ground = np.zeros((len(bins.starts) - 1, 4), np.float32)
-        _in_threads(canvas.module.backward_tiles, *ctx.shared, _array(seed), longest, grads, ground)
+        _in_threads(canvas.module.backward_tiles, *ctx.shared, _array(cotangent), longest, grads, ground)
         totals = np.zeros((len(canvas.kinds), width), np.float64)
         canvas.module.reduce_pairs(bins.layers, grads, totals)
         background = ground.sum(axis=0, dtype=np.float64)

@@ -1,18 +1,18 @@
 """The fused renderer's kernels: text generated from the same expressions as everything else.
 
-A text holds only the kinds of layer that a scene uses.
+A text holds only the structures of layers that a scene has.
 """
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from dataclasses import replace
 from functools import cache
 from types import ModuleType
-from typing import NamedTuple
 
-from ..blend import COMPOSITING, coverage, reach, saturation, smooth_union, union_reach
-from ..expr import VEC2, VEC3, VEC4, Expr, Operand, components_of, const, maximum, minimum, scalarize, var
+from ..expr import VEC4, Expr, components_of, scalarize, var, walk
+from ..layer import Formula, P, Structure
 from ..lower.numba import PREAMBLE, Block, backward, forward, scalar
-from ..shapes import KINDS
 from ..templating import template
 from . import compiled
 
@@ -20,108 +20,79 @@ TILE = 16  # pixels along a side of a tile, the block that kernels work on
 PIXELS = TILE * TILE
 
 
-BELOW, TINT, OPACITY = var("below", VEC4), var("color", VEC3), var("opacity")
-LOOK = (*components_of(TINT), OPACITY)  # a layer's row of numbers begins with these; then `Formula.uniforms`
+BELOW = var("below", VEC4)
+ROW_OPACITY = 1  # its place in a layer's row of numbers: `Formula.uniforms`
 
 
-class LayerKind(NamedTuple):
-    """What decides the formula of a layer: the kind of its shapes and how many are joined."""
-
-    kind: str
-    union_size: int
+def drawn(formula: Formula, name: str, compositing: str, channels: int) -> Block:
+    """What a block of pixels becomes when a layer is laid on it."""
+    return _block(formula, name, formula.draw(BELOW, compositing), channels)
 
 
-class Formula:
-    """A layer's coverage (and colour, for a union) as expressions of a point and one row of uniforms."""
+def solid_blocks(formulas: Sequence[Formula], compositing: str, channels: int) -> list[Block | None]:
+    """For each structure what a block of pixels becomes that a layer covers wholly; the same one for equal formulas.
 
-    def __init__(self, layer: LayerKind) -> None:
-        kind, size = KINDS[layer.kind], layer.union_size
-        suffixes = [f"_{i}" for i in range(size)]
-        self.point = var("p", VEC2)
-        self.pixel, self.falloff, self.smoothness = var("pixel"), var("falloff"), var("smoothness")
-        self.parameters = [kind.variables(suffix) for suffix in suffixes]
-        self.colors = [var(f"color{suffix}", VEC3) for suffix in suffixes]
-        distances = [kind.distance(self.point, *row) for row in self.parameters]
-        self.distance, self.color = smooth_union(distances, self.colors, self.smoothness)
-        self.kind, self.size = kind, size
-
-    @property
-    def uniforms(self) -> tuple[Expr, ...]:
-        """What its coverage needs: pixel, falloff, (smoothness,) parameters, (colours)."""
-        scalars = tuple(s for row in self.parameters for v in row for s in components_of(v))
-        if self.size == 1:
-            return (self.pixel, self.falloff, *scalars)
-        colors = (s for color in self.colors for s in components_of(color))
-        return (self.pixel, self.falloff, self.smoothness, *scalars, *colors)
-
-    def drawn(self, name: str, compositing: str, channels: int) -> Block:
-        """What a block of pixels becomes when the layer is laid on it, of one row of numbers (see `LOOK`)."""
-        color = TINT if self.size == 1 else self.color
-        cover = coverage(self.distance, self.falloff, self.pixel)
-        below = COMPOSITING[compositing](BELOW, color, OPACITY, cover)
-        varying = (*components_of(self.point), *flows_of(channels))
-        return Block(name, scalarize(below)[:channels], varying, (*LOOK, *self.uniforms))
-
-    def bounds(self, slack: Operand = 0.0) -> tuple[Expr, ...]:
-        """Box (low x, low y, high x, high y), distance from which coverage is 0, up to which 1, slope.
-
-        They hold for every distance that is off by at most `slack`.
-        """
-        outer = reach(self.falloff, self.pixel) + slack
-        inner = saturation(self.falloff, self.pixel) - slack
-        margin = outer + union_reach(self.size, self.smoothness)
-        boxes = [scalarize(self.kind.extent(margin, *row)) for row in self.parameters]
-        slopes = [scalarize(self.kind.slope(*row))[0] for row in self.parameters]
-        box, slope = list(boxes[0]), slopes[0]
-        for other, steep in zip(boxes[1:], slopes[1:], strict=True):
-            box = [pick(a, b) for pick, a, b in zip((minimum,) * 2 + (maximum,) * 2, box, other, strict=True)]
-            slope = maximum(slope, steep)
-        return (*box, *scalarize(outer), *scalarize(inner), *scalarize(slope))
+    None where colours are mixed.
+    """
+    found: dict[tuple[Expr, ...], Block] = {}
+    blocks: list[Block | None] = []
+    for formula in formulas:
+        block = _block(formula, f"solid{len(found)}", formula.fill(BELOW, compositing), channels)
+        used = set(walk(block.outputs))
+        last = max(index for index, uniform in enumerate(block.uniforms) if uniform in used)
+        block = replace(block, uniforms=block.uniforms[: last + 1])
+        blocks.append(found.setdefault(block.outputs, block) if formula.is_solid else None)
+    return blocks
 
 
-def flows_of(channels: int) -> tuple[Expr, ...]:
-    """The channels of what lies below a layer."""
+def _block(formula: Formula, name: str, result: Expr, channels: int) -> Block:
+    varying = (*components_of(P), *carried(channels))
+    return Block(name, scalarize(result)[:channels], varying, formula.uniforms)
+
+
+def carried(channels: int) -> tuple[Expr, ...]:
+    """The channels of what lies below a layer: what one block hands on to the next."""
     return components_of(BELOW)[:channels]
 
 
-def solid(compositing: str, channels: int) -> Block:
-    """What a block of pixels becomes when a layer that covers all of it is laid on it."""
-    below = COMPOSITING[compositing](BELOW, TINT, OPACITY, const(1.0))
-    return Block("solid", scalarize(below)[:channels], flows_of(channels), LOOK)
+def text(structures: tuple[Structure, ...], compositing: str, channels: int) -> str:
+    """The whole module for layers of these structures and 3 or 4 channels of colour.
 
-
-def text(layers: tuple[LayerKind, ...], compositing: str, channels: int) -> str:
-    """The whole module for these kinds of layer and 3 or 4 channels of colour."""
-    parts = [PREAMBLE, *_both_ways(solid(compositing, channels), channels)]
-    for index, layer in enumerate(layers):
-        formula = Formula(layer)
-        row, point = (*LOOK, *formula.uniforms), components_of(formula.point)
+    A layer's row of numbers is `Formula.uniforms`.
+    """
+    parts = [PREAMBLE]
+    formulas = [Formula.of(structure) for structure in structures]
+    for index, formula in enumerate(formulas):
         parts += [
-            f"# {layer.kind}, {layer.union_size} joined",
-            *_both_ways(formula.drawn(f"layer{index}", compositing, channels), channels),
-            scalar(f"bounds{index}", formula.bounds(), (), row),
-            scalar(f"distance{index}", scalarize(formula.distance), point, row),
+            f"# {formula}",
+            *_both_ways(drawn(formula, f"layer{index}", compositing, channels), channels),
+            scalar(f"bounds{index}", formula.bounds(), (), formula.uniforms),
+            scalar(f"distance{index}", scalarize(formula.distance), components_of(P), formula.uniforms),
         ]
+    solid = solid_blocks(formulas, compositing, channels)
+    for block in dict.fromkeys(block for block in solid if block):
+        parts += _both_ways(block, channels)
     driver = template("tiles.py.jinja").render(
         tile=TILE,
         pixels=PIXELS,
         farthest=(TILE - 1) / 2 * 2**0.5,
         channels=channels,
-        unions=[layer.union_size > 1 for layer in layers],
+        solid=[block.name if block else None for block in solid],
+        opacity=ROW_OPACITY,
     )
     return "\n\n".join([*parts, driver])
 
 
 def _both_ways(block: Block, channels: int) -> tuple[str, str]:
-    return forward(block, flows_of(channels)), backward(block, flows_of(channels))
+    return forward(block, carried(channels)), backward(block, carried(channels))
 
 
 @cache
-def load(layers: tuple[LayerKind, ...], compositing: str, channels: int) -> ModuleType:
-    """The compiled module for these kinds of layer and 3 or 4 channels of colour."""
-    return compiled.load(text(layers, compositing, channels))
+def load(structures: tuple[Structure, ...], compositing: str, channels: int) -> ModuleType:
+    """The compiled module for layers of these structures and 3 or 4 channels of colour."""
+    return compiled.load(text(structures, compositing, channels))
 
 
-def is_compiled(layers: tuple[LayerKind, ...], compositing: str, channels: int) -> bool:
+def is_compiled(structures: tuple[Structure, ...], compositing: str, channels: int) -> bool:
     """Whether these kernels have been compiled before on this machine."""
-    return compiled.is_compiled(text(layers, compositing, channels), "backward_tiles")
+    return compiled.is_compiled(text(structures, compositing, channels), "backward_tiles")

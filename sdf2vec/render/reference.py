@@ -13,11 +13,11 @@ import numpy as np
 import torch
 from torch.utils.checkpoint import checkpoint
 
-from ..blend import COMPOSITING, coverage, display, pixel_size, scene_point, smooth_union
+from ..blend import COMPOSITING, display, pixel_size, scene_point
 from ..expr import VEC2, VEC3, VEC4, components_of, scalarize, var
+from ..layer import Formula, P, Structure
 from ..lower.torch import Tensors, compile_torch
 from ..scene import Scene
-from ..shapes import KINDS
 from .tensors import Group, SceneTensors, from_scene
 
 CHUNK = 1 << 22  # layers × pixels held at a time
@@ -96,8 +96,8 @@ def composite_points(
     """Premultiplied RGBA [4, P] before clamping, at points x [P], y [P], for a canvas with this size of pixel."""
     layers: dict[int, tuple[torch.Tensor, torch.Tensor, torch.Tensor]] = {}
     for group in tensors.groups:
-        cover, color = group_coverage(group, x, y, pixel)
-        layers |= zip(group.order.tolist(), zip(cover, color, group.opacity, strict=True), strict=True)
+        cover, color = group_coverage(group, tensors.compositing, x, y, pixel)
+        layers |= zip(group.order.tolist(), zip(cover, color, group.opacity[:, 0], strict=True), strict=True)
     blend_color, blend_alpha = _blending(tensors.compositing)
     rgb = tensors.background[:3, None].expand(3, len(x))
     alpha = tensors.background[3:].expand(len(x))
@@ -109,18 +109,11 @@ def composite_points(
 
 
 def group_coverage(
-    group: Group, x: torch.Tensor, y: torch.Tensor, pixel: torch.Tensor
+    group: Group, compositing: str, x: torch.Tensor, y: torch.Tensor, pixel: torch.Tensor
 ) -> tuple[torch.Tensor, torch.Tensor]:
     """Coverage [G, P] and colour [G, 3, P or 1] of a group's layers at points x [P], y [P]."""
-    columns = [
-        part[:, index]  # [G, 1]
-        for index in range(group.union_size)
-        for parameter in KINDS[group.kind].parameters
-        for part in group.parameters[parameter.name].split(1, dim=2)
-    ]
-    colors = [part[:, i] for i in range(group.union_size) for part in group.colors.split(1, dim=2)]
-    uniform = (group.falloff[:, None], group.smoothness[:, None])
-    cover, *color = _layer(group.kind, group.union_size)(x, y, pixel, *uniform, *columns, *colors)
+    columns = group.rows().split(1, dim=1)  # [G, 1] each
+    cover, *color = _layer(group.structure, compositing)(x, y, pixel, *columns)
     return cover, torch.stack(color, dim=1)
 
 
@@ -130,7 +123,9 @@ def layers_at(
 ) -> tuple[torch.Tensor, torch.Tensor]:
     """Coverage [L, P] and colour [L, 3, P or 1] of a scene's layers, in draw order, at points x [P], y [P]."""
     order = torch.cat([group.order for group in tensors.groups]).argsort()
-    covers, colors = zip(*(group_coverage(group, x, y, pixel) for group in tensors.groups), strict=True)
+    covers, colors = zip(
+        *(group_coverage(group, tensors.compositing, x, y, pixel) for group in tensors.groups), strict=True
+    )
     widest = max(color.shape[2] for color in colors)
     return torch.cat(covers)[order], torch.cat([color.expand(-1, -1, widest) for color in colors])[order]
 
@@ -139,24 +134,17 @@ def layers_at(
 
 
 @cache
-def _layer(kind: str, union_size: int) -> Callable[..., Tensors]:
+def _layer(structure: Structure, compositing: str) -> Callable[..., Tensors]:
     """Coverage and colour of a layer."""
-    p, pixel, falloff, smoothness = var("p", VEC2), var("pixel"), var("falloff"), var("smoothness")
-    suffixes = [f"_{i}" for i in range(union_size)]
-    colors = [var(f"color{suffix}", VEC3) for suffix in suffixes]
-    distances = [KINDS[kind].distance(p, *KINDS[kind].variables(suffix)) for suffix in suffixes]
-    distance, color = smooth_union(distances, colors, smoothness)
-    inputs = [*components_of(p), pixel, falloff, smoothness]
-    inputs += [scalar for suffix in suffixes for scalar in KINDS[kind].scalars(suffix)]
-    inputs += [scalar for c in colors for scalar in components_of(c)]
-    return compile_torch([coverage(distance, falloff, pixel), color], inputs)
+    formula = Formula.of(structure)
+    return compile_torch([formula.cover(compositing), formula.color], [*components_of(P), *formula.uniforms])
 
 
 @cache
 def _blending(compositing: str) -> tuple[Callable[..., Tensors], Callable[..., Tensors]]:
     """One colour channel, and alpha, of laying a layer on what is below."""
     below, color, opacity, cover = var("below", VEC4), var("color", VEC3), var("opacity"), var("cover")
-    red, _, _, alpha = scalarize(COMPOSITING[compositing](below, color, opacity, cover))
+    red, _, _, alpha = scalarize(COMPOSITING[compositing].draw(below, color, opacity, cover))
     below_red, *_, below_alpha = components_of(below)
     return (
         compile_torch([red], [below_red, components_of(color)[0], opacity, cover]),

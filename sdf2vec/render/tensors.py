@@ -1,6 +1,6 @@
 """A scene as tensors: what renderers compute with and what fitting optimises.
 
-Layers of the same kind and number of shapes form a group, so that one lowered formula evaluates all of them.
+Layers of the same structure form a group, so that one lowered formula evaluates all of them.
 """
 
 from __future__ import annotations
@@ -11,48 +11,64 @@ from dataclasses import dataclass
 
 import torch
 
-from ..scene import Color, Layer, Scene, Shape
+from ..layer import Slot, Structure, slots
+from ..scene import Color, Layer, Scene
 from ..shapes import KINDS
+from ..units import COLOR
 
 
 @dataclass
 class Group:
-    """G layers of K shapes of one kind each."""
+    """G layers of one structure: a tensor [G, width] for each slot of their rows."""
 
-    kind: str
+    structure: Structure
     order: torch.Tensor  # [G] int64: place of each layer in the draw order
-    parameters: dict[str, torch.Tensor]  # name → [G, K, 1 or 2]
-    colors: torch.Tensor  # [G, K, 3]
-    falloff: torch.Tensor  # [G] scene units
-    opacity: torch.Tensor  # [G]
-    smoothness: torch.Tensor  # [G] scene units; of no meaning for K = 1
+    values: dict[Slot, torch.Tensor]
+
+    def __len__(self) -> int:
+        return len(self.order)
+
+    def of(self, name: str, part: int | None = None) -> torch.Tensor:
+        """A parameter's tensor [G, width]; of the layer unless a part is told."""
+        return next(v for s, v in self.values.items() if s.part == part and s.parameter.name == name)
 
     @property
-    def union_size(self) -> int:
-        return self.colors.shape[1]
+    def opacity(self) -> torch.Tensor:
+        """[G, 1]"""
+        return self.of("opacity")
 
-    def tensors(self) -> Iterator[tuple[str, torch.Tensor]]:
-        """Everything that can be optimised, by the name that its learning rate has."""
-        for parameter in KINDS[self.kind].parameters:
-            yield parameter.unit, self.parameters[parameter.name]
-        yield "color", self.colors
-        yield "falloff", self.falloff
-        yield "opacity", self.opacity
-        if self.union_size > 1:
-            yield "smoothness", self.smoothness
+    @property
+    def falloff(self) -> torch.Tensor:
+        """[G, 1]"""
+        return self.of("falloff")
+
+    @property
+    def colors(self) -> list[torch.Tensor]:
+        """All colours of paints that can be seen, each [G, 3]."""
+        return [
+            tensor
+            for slot, tensor in self.values.items()
+            if slot.part is not None and slot.parameter.unit is COLOR and self.structure[slot.part].adds
+        ]
+
+    def shape(self, part: int) -> list[torch.Tensor]:
+        """The numbers of one shape, [G] each, in the order of a flat parameter row."""
+        parameters = KINDS[self.structure[part].kind].parameters
+        return [column for p in parameters for column in self.values[Slot(part, p)].unbind(1)]
+
+    def rows(self) -> torch.Tensor:
+        """The layers' rows [G, U]: see `layer.slots`."""
+        return torch.cat(list(self.values.values()), dim=1)
 
     def each(self, change: Callable[[torch.Tensor], torch.Tensor]) -> Group:
         """A group with all tensors changed, the draw order's too: moved, or some rows taken."""
-        parameters = {name: change(values) for name, values in self.parameters.items()}
-        look = map(change, (self.colors, self.falloff, self.opacity, self.smoothness))
-        return Group(self.kind, change(self.order), parameters, *look)
+        values = {slot: change(tensor) for slot, tensor in self.values.items()}
+        return Group(self.structure, change(self.order), values)
 
     def joined(self, other: Group) -> Group:
         """The rows of both, this group's first."""
-        parameters = {name: torch.cat([a, other.parameters[name]]) for name, a in self.parameters.items()}
-        looks = [(g.order, g.colors, g.falloff, g.opacity, g.smoothness) for g in (self, other)]
-        order, *look = (torch.cat(pair) for pair in zip(*looks, strict=True))
-        return Group(self.kind, order, parameters, *look)
+        values = {slot: torch.cat([tensor, other.values[slot]]) for slot, tensor in self.values.items()}
+        return Group(self.structure, torch.cat([self.order, other.order]), values)
 
 
 @dataclass
@@ -66,7 +82,11 @@ class SceneTensors:
 
     @property
     def layer_count(self) -> int:
-        return sum(len(group.order) for group in self.groups)
+        return sum(map(len, self.groups))
+
+    @property
+    def shape_count(self) -> int:
+        return sum(len(group) * len(group.structure) for group in self.groups)
 
     @property
     def transparent(self) -> bool:
@@ -81,38 +101,25 @@ def on_device(tensors: SceneTensors, device: str) -> SceneTensors:
 
 def from_scene(scene: Scene, dtype: torch.dtype = torch.float32, device: str = "cpu") -> SceneTensors:
     """The scene's numbers as tensors."""
-    members: dict[tuple[str, int], list[int]] = defaultdict(list)
+    members: dict[Structure, list[int]] = defaultdict(list)
     for index, layer in enumerate(scene.layers):
-        members[layer.kind, len(layer.shapes)].append(index)
+        members[layer.structure].append(index)
     places = {kind: place for place, kind in enumerate(KINDS)}
-    groups = sorted(members.items(), key=lambda item: (places[item[0][0]], item[0][1]))
+    groups = sorted(members.items(), key=lambda item: (places[item[0][0].kind], len(item[0]), item[0]))
     background = (*scene.background, 1.0) if scene.background is not None else (0.0,) * 4
     return SceneTensors(
-        [_group(scene, kind, order, dtype, device) for (kind, _), order in groups],
+        [_group(scene, structure, order, dtype, device) for structure, order in groups],
         torch.tensor(background, dtype=dtype, device=device),
         scene.compositing,
         scene.extent,
     )
 
 
-def _group(scene: Scene, kind: str, order: list[int], dtype: torch.dtype, device: str) -> Group:
-    layers = [scene.layers[index] for index in order]
-
-    def tensor(values: list[object]) -> torch.Tensor:
-        return torch.tensor(values, dtype=dtype, device=device)
-
-    flat = tensor([[shape.parameters for shape in layer.shapes] for layer in layers])  # [G, K, P]
-    widths = [len(parameter.start) for parameter in KINDS[kind].parameters]
-    names = [parameter.name for parameter in KINDS[kind].parameters]
-    return Group(
-        kind,
-        torch.tensor(order, device=device),
-        dict(zip(names, (part.clone() for part in flat.split(widths, dim=2)), strict=True)),
-        tensor([[shape.color for shape in layer.shapes] for layer in layers]),
-        tensor([layer.falloff for layer in layers]),
-        tensor([layer.opacity for layer in layers]),
-        tensor([layer.smoothness for layer in layers]),
-    )
+def _group(scene: Scene, structure: Structure, order: list[int], dtype: torch.dtype, device: str) -> Group:
+    rows = torch.tensor([scene.layers[index].numbers for index in order], dtype=dtype, device=device)
+    parts = rows.split([slot.parameter.width for slot in slots(structure)], dim=1)
+    values = dict(zip(slots(structure), (part.clone() for part in parts), strict=True))
+    return Group(structure, torch.tensor(order, device=device), values)
 
 
 def to_scene(tensors: SceneTensors, width: int, height: int) -> Scene:
@@ -125,11 +132,7 @@ def to_scene(tensors: SceneTensors, width: int, height: int) -> Scene:
 
 
 def _layers(group: Group) -> Iterator[Layer]:
-    flat = torch.cat([group.parameters[p.name] for p in KINDS[group.kind].parameters], dim=2)
-    rows = (flat, group.colors, group.falloff, group.opacity, group.smoothness)
-    for values, colors, falloff, opacity, smoothness in zip(*(row.tolist() for row in rows), strict=True):
-        shapes = (Shape(group.kind, tuple(v), _color(c)) for v, c in zip(values, colors, strict=True))
-        yield Layer(tuple(shapes), falloff, opacity, smoothness)
+    return (Layer.from_numbers(group.structure, row) for row in group.rows().tolist())
 
 
 def _color(values: list[float]) -> Color:

@@ -15,12 +15,12 @@ from typing import Any
 import torch
 from torch.autograd.function import once_differentiable
 
+from ..blend import COMPOSITING
 from . import triton_kernels
-from .fused import kinds_of, rows_of
-from .kernels import PIXELS, TILE
+from .fused import rows_of, structures_of
+from .kernels import PIXELS, ROW_OPACITY, TILE
 from .reference import canvas_axes
 from .tensors import SceneTensors
-from .triton_kernels import SOLID
 
 SCRATCH = 1 << 29  # bytes
 WARPS = 4  # of 32 threads, for the 256 pixels of a tile; with fewer, unions run out of registers
@@ -55,6 +55,7 @@ class _Canvas:
     y: torch.Tensor
     pixel: float  # scene units
     hides: bool  # an opaque layer hides what is below it
+    group_count: int
 
     @property
     def columns(self) -> int:
@@ -70,7 +71,7 @@ def _canvas(tensors: SceneTensors, width: int, height: int, channels: int) -> _C
     x, y, pixel = canvas_axes(tensors, -(-width // TILE) * TILE, -(-height // TILE) * TILE, width, height)
     orders = [group.order for group in tensors.groups]
     return _Canvas(
-        module=triton_kernels.load(kinds_of(tensors), tensors.compositing, channels),
+        module=triton_kernels.load(structures_of(tensors), tensors.compositing, channels),
         groups=torch.cat([torch.full_like(order, index) for index, order in enumerate(orders)]),
         order=torch.cat(orders),
         channels=channels,
@@ -79,7 +80,8 @@ def _canvas(tensors: SceneTensors, width: int, height: int, channels: int) -> _C
         x=torch.from_numpy(x).to(device),
         y=torch.from_numpy(y).to(device),
         pixel=float(pixel),
-        hides=tensors.compositing == "over",
+        hides=COMPOSITING[tensors.compositing].hides,
+        group_count=len(orders),
     )
 
 
@@ -96,7 +98,9 @@ class _Bins:
     starts: torch.Tensor  # [tiles + 1]: those of tile t are starts[t] up to starts[t + 1]
     visible: torch.Tensor  # [tiles]: the first pair that is not wholly hidden by an opaque one above it
     layers: torch.Tensor  # [P]
-    kinds: torch.Tensor  # [P]: the group of the layer, or SOLID
+    kinds: (
+        torch.Tensor
+    )  # [P]: the group of the layer; that plus the number of groups where it covers the whole tile
     places: torch.Tensor  # [P]: where the pair is when sorted by layer
     layer_starts: torch.Tensor  # [L + 1]: the places of layer l's pairs are layer_starts[l] up to the next
 
@@ -117,8 +121,8 @@ def _bin(canvas: _Canvas, rows: torch.Tensor) -> _Bins:
     keys, by_tile = keys.sort()
     layers, solid = layers[by_tile], full[by_tile].bool()
     starts = torch.searchsorted(keys, torch.arange(canvas.columns * canvas.lines + 1, device=device) * count)
-    visible = _visible(starts, solid & (rows[layers, -1] == 1.0)) if canvas.hides else starts[:-1]
-    kinds = torch.where(solid, SOLID, canvas.groups[layers])
+    visible = _visible(starts, solid & (rows[layers, ROW_OPACITY] == 1.0)) if canvas.hides else starts[:-1]
+    kinds = canvas.groups[layers] + solid * canvas.group_count
     return _Bins(*(part.int() for part in (starts, visible, layers, kinds, by_tile, layer_starts)))
 
 
@@ -152,19 +156,19 @@ class _Composite(torch.autograd.Function):
 
     @staticmethod
     @once_differentiable
-    def backward(ctx: Any, seed: torch.Tensor) -> tuple[torch.Tensor | None, ...]:
+    def backward(ctx: Any, cotangent: torch.Tensor) -> tuple[torch.Tensor | None, ...]:
         rows, background = ctx.saved_tensors
         with torch.cuda.device_of(rows):
-            return None, *_derivatives(ctx.canvas, ctx.bins, rows, background, seed.float().contiguous())
+            return None, *_derivatives(ctx.canvas, ctx.bins, rows, background, cotangent.float().contiguous())
 
 
 def _derivatives(
-    canvas: _Canvas, bins: _Bins, rows: torch.Tensor, background: torch.Tensor, seed: torch.Tensor
+    canvas: _Canvas, bins: _Bins, rows: torch.Tensor, background: torch.Tensor, cotangent: torch.Tensor
 ) -> tuple[torch.Tensor, torch.Tensor]:
     """Those by the layers' rows and by the background."""
     grads = rows.new_zeros(len(bins.layers), rows.shape[1])
     ground = rows.new_zeros(len(bins.visible), 4)
-    shared = (*_shared(canvas, bins, rows, background), seed)
+    shared = (*_shared(canvas, bins, rows, background), cotangent)
     chunks = _chunks(bins, SCRATCH // (4 * canvas.channels * PIXELS))
     scratch = rows.new_empty(max(pairs for _, _, pairs in chunks), canvas.channels, PIXELS)
     for first, count, _ in chunks:

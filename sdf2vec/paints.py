@@ -1,0 +1,68 @@
+"""What colour a shape has at a point.
+
+To add a paint, write its colour as an expression and add one entry to `PAINTS`; renderers, gradients and exports
+follow. Every paint begins with `color`; its other parameters are its own.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+from .expr import VEC2, VEC3, Expr, clamp, dot, function, mix
+from .units import COLOR, DIRECTION, Parameter
+
+
+@dataclass(frozen=True)
+class Paint:
+    """`color(q, color, *own)` is the colour (vec3) at a point q of the shape's frame, in which the shape reaches from
+    about −1 to 1 along both axes. `own` are the parameters after `color`. `ramp` tells vector formats of one that is a linear gradient:
+    from its own parameters' values the points of the frame where it has its first and its last colour.
+    """
+
+    name: str
+    color: Callable[..., Expr]
+    own: tuple[Parameter, ...] = ()
+    ramp: Callable[..., tuple[tuple[float, float], tuple[float, float]]] | None = None
+
+    @property
+    def parameters(self) -> tuple[Parameter, ...]:
+        """All of them."""
+        return (BASE, *self.own)
+
+    @property
+    def is_flat(self) -> bool:
+        """Whether the colour is the same everywhere."""
+        return not self.own
+
+
+BASE = Parameter("color", COLOR, (0.0, 0.0, 0.0))
+
+
+@function("linearPaint", q=VEC2, color=VEC3, color_end=VEC3, direction=VEC2)
+def linear_paint(q: Expr, color: Expr, color_end: Expr, direction: Expr) -> Expr:
+    """From one colour to another along a direction of the shape's frame, half of each at its middle."""
+    return mix(color, color_end, clamp(0.5 + dot(q, direction), 0.0, 1.0))
+
+
+def _linear_ramp(
+    color_end: tuple[float, float, float], direction: tuple[float, float]
+) -> tuple[tuple[float, float], tuple[float, float]]:
+    x, y = direction
+    half = 0.5 / max(x * x + y * y, 1e-12)
+    return (-x * half, -y * half), (x * half, y * half)
+
+
+PAINTS: dict[str, Paint] = {
+    paint.name: paint
+    for paint in (
+        Paint("flat", lambda q, color: color),
+        Paint(
+            "linear",
+            linear_paint,
+            (Parameter("color_end", COLOR, (0.0, 0.0, 0.0)), Parameter("direction", DIRECTION, (0.5, 0.0))),
+            ramp=_linear_ramp,
+        ),
+    )
+}
+FLAT = "flat"

@@ -1,0 +1,290 @@
+"""What a number of a scene is: its range, its learning rate, where it starts, what a fit may make of it, its codec.
+
+A unit is one record. Tensors are only ever used through their methods, so that nothing here needs torch.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any, NamedTuple
+
+from .expr import FLOAT, VECTOR, Expr, Type, components_of, const, function, length, let, operation, var
+
+LONGEST_CANVAS = 65536.0  # scene units: the longest canvas there can be; anything larger is a mistake
+MARGIN = 0.3  # scene units that a position may leave the canvas by
+LONGEST = 1.5  # longest sides of the canvas
+HIGHEST_FREQUENCY = 60.0  # radians per scene unit
+STEEPEST = 4.0  # of a gradient: ranges of colour across half a shape
+FAINTEST = 0.02  # opacity where colours are not signed: below it a shape would stop learning
+GEOMETRY_DECIMALS = 6
+COLOR_DECIMALS = 5
+
+
+class Room(NamedTuple):
+    """What a fit has to hold its numbers in: the canvas and a pixel in scene units, and ranges."""
+
+    size: tuple[float, float]
+    pixel: float
+    falloff: tuple[float, float] = (0.0, LONGEST)
+    signed: bool = False  # colours −1..1
+
+
+class Placed(NamedTuple):
+    """Where shapes start: centres [N, 2] and sizes [N] in scene units, turns [N] in radians; tensors."""
+
+    centers: Any
+    sizes: Any
+    turns: Any
+
+
+class Fractions(NamedTuple):
+    """What fractions 0..1 of a packed scene are fractions of: the layer's box of cells, and ranges by unit."""
+
+    corner: Expr  # vec2
+    box: Expr  # vec2
+    ranges: Mapping[str, tuple[float, float]]
+
+
+@dataclass(frozen=True)
+class Codec:
+    """How a packed scene says a number. `decode`: its value from a fraction 0..1 of `power` at which it is finer near 0.
+
+    `precision`: whose bits it has: "place" (as many as the layer's edge needs) or those of a field of its own.
+    """
+
+    decode: Callable[[Expr, Fractions], Expr]
+    precision: str = "place"
+    power: int = 1
+
+
+@dataclass(frozen=True)
+class Unit:
+    """What a number is.
+
+    `low` and `high` bound it in a scene, where it has so many `decimals`. `rate` is Adam's for one step on a canvas
+    of area 1; it grows with the power `scaling` of the square root of the canvas' area, and falls with the number of
+    layers where they are `crowded`. `start(values, placed)` is where a parameter starts whose values are for a shape of size 1
+    at the origin, [N, width]. `project(values, positive, room)` moves a fit's values [N, width] into their range, in place.
+    """
+
+    name: str
+    low: float
+    high: float
+    rate: float
+    project: Callable[[Any, bool, Room], None]
+    codec: Codec
+    start: Callable[[tuple[float, ...], Placed], Any] | None = None
+    decimals: int = GEOMETRY_DECIMALS
+    scaling: int = 0
+    crowded: bool = False
+
+
+@dataclass(frozen=True)
+class Parameter:
+    """One parameter of a shape, a paint or a layer.
+
+    `start` is the value for a shape of size 1 at the origin: what `unit.start` takes. The unit's least value is
+    excluded where it is `positive`.
+    """
+
+    name: str
+    unit: Unit
+    start: tuple[float, ...] = (0.0,)
+    positive: bool = False
+
+    @property
+    def width(self) -> int:
+        """How many numbers it is."""
+        return len(self.start)
+
+    @property
+    def type(self) -> Type:
+        return VECTOR[self.width]
+
+    def variable(self, suffix: str = "") -> Expr:
+        """A variable of its name."""
+        return var(self.name + suffix, self.type)
+
+    def scalars(self, suffix: str = "") -> tuple[Expr, ...]:
+        """The float variables behind `variable`."""
+        return components_of(self.variable(suffix))
+
+    def values_from(self, numbers: Sequence[float]) -> float | tuple[float, ...]:
+        """Its value as users have it: a float, or a tuple of several."""
+        return tuple(numbers) if self.width > 1 else numbers[0]
+
+
+# --- where numbers start ------------------------------------------------------------------------------------
+
+
+def _turned(values: tuple[float, ...], placed: Placed) -> Any:
+    x, y = (placed.turns.new_tensor(pair) for pair in (values, (-values[1], values[0])))
+    return placed.turns.cos()[:, None] * x + placed.turns.sin()[:, None] * y
+
+
+def _start_position(values: tuple[float, ...], placed: Placed) -> Any:
+    return placed.centers + _turned(values, placed) * placed.sizes[:, None]
+
+
+def _start_length(values: tuple[float, ...], placed: Placed) -> Any:
+    return placed.sizes.new_tensor(values) * placed.sizes[:, None]
+
+
+def _start_angle(values: tuple[float, ...], placed: Placed) -> Any:
+    return placed.turns.new_tensor(values) + placed.turns[:, None]
+
+
+def _start_frequency(values: tuple[float, ...], placed: Placed) -> Any:
+    return placed.sizes.new_tensor(values) / placed.sizes[:, None]
+
+
+# --- what a fit may make of them -----------------------------------------------------------------------------
+
+
+def _keep_position(values: Any, positive: bool, room: Room) -> None:
+    for axis, side in enumerate(room.size):
+        values[..., axis].clamp_(-side / 2 - MARGIN, side / 2 + MARGIN)
+
+
+def _keep_length(values: Any, positive: bool, room: Room) -> None:
+    values.clamp_(room.pixel if positive else 0.0, LONGEST * max(room.size))
+
+
+def _keep_angle(values: Any, positive: bool, room: Room) -> None:
+    values.remainder_(math.tau)
+
+
+def _keep_within(low: float, high: float) -> Callable[[Any, bool, Room], None]:
+    return lambda values, positive, room: values.clamp_(low, high)
+
+
+def _keep_color(values: Any, positive: bool, room: Room) -> None:
+    values.clamp_(-1.0 if room.signed else 0.0, 1.0)
+
+
+def _keep_opacity(values: Any, positive: bool, room: Room) -> None:
+    values.clamp_(-1.0 if room.signed else FAINTEST, 1.0)
+
+
+def _keep_falloff(values: Any, positive: bool, room: Room) -> None:
+    values.clamp_(*room.falloff)
+
+
+# --- how a packed scene says them ----------------------------------------------------------------------------
+
+
+@function("grown", v=FLOAT, largest=FLOAT)
+def grown(v: Expr, largest: Expr) -> Expr:
+    """A length from its fraction, finer near 0."""
+    square = let("square", v * v)
+    return square * square * largest
+
+
+def _place_in_box(v: Expr, of: Fractions) -> Expr:
+    return of.corner + of.box * v
+
+
+def _share_of_span(v: Expr, of: Fractions) -> Expr:
+    return length(of.box) * v
+
+
+def _between(unit: str) -> Callable[[Expr, Fractions], Expr]:
+    """A value between the least and the largest of the scene."""
+
+    def decode(v: Expr, of: Fractions) -> Expr:
+        low, high = of.ranges[unit]
+        if (low, high) == (0.0, 1.0):
+            return v
+        least = const(low) if v.type is FLOAT else operation(f"vec{v.type.width}", low)
+        return least + v * (high - low)
+
+    return decode
+
+
+def _up_to(unit: str) -> Callable[[Expr, Fractions], Expr]:
+    return lambda v, of: grown(v, const(of.ranges[unit][1]))
+
+
+_PLACE, _SPAN = Codec(_place_in_box), Codec(_share_of_span)
+_TURN = Codec(lambda v, of: v * math.tau)
+
+
+# --- the units -----------------------------------------------------------------------------------------------
+
+POSITION = Unit(
+    "position",
+    -LONGEST_CANVAS,
+    LONGEST_CANVAS,
+    0.01,
+    _keep_position,
+    _PLACE,
+    _start_position,
+    scaling=1,
+    crowded=True,
+)
+LENGTH = Unit(
+    "length", 0.0, LONGEST_CANVAS, 0.003, _keep_length, _SPAN, _start_length, scaling=1, crowded=True
+)
+ANGLE = Unit("angle", -1000.0, 1000.0, 0.03, _keep_angle, _TURN, _start_angle)
+FREQUENCY = Unit(
+    "frequency",
+    -1000.0,
+    1000.0,
+    0.3,
+    _keep_within(-HIGHEST_FREQUENCY, HIGHEST_FREQUENCY),
+    Codec(_between("frequency")),
+    _start_frequency,
+    scaling=-1,
+)
+DIRECTION = Unit(
+    "direction",
+    -1000.0,
+    1000.0,
+    0.02,
+    _keep_within(-STEEPEST, STEEPEST),
+    Codec(_between("direction")),
+    _turned,
+)
+COLOR = Unit(
+    "color",
+    -1.0,
+    1.0,
+    0.014,
+    _keep_color,
+    Codec(_between("color"), "color"),
+    decimals=COLOR_DECIMALS,
+    crowded=True,
+)
+OPACITY = Unit(
+    "opacity",
+    -1.0,
+    1.0,
+    0.01,
+    _keep_opacity,
+    Codec(_between("opacity"), "opacity"),
+    decimals=COLOR_DECIMALS,
+    crowded=True,
+)
+FALLOFF = Unit(
+    "falloff",
+    0.0,
+    LONGEST_CANVAS,
+    0.01,
+    _keep_falloff,
+    Codec(_up_to("falloff"), "falloff", 4),
+    scaling=1,
+    crowded=True,
+)
+SMOOTHNESS = Unit(
+    "smoothness",
+    0.0,
+    LONGEST_CANVAS,
+    0.003,
+    _keep_within(1e-3, LONGEST),
+    Codec(_up_to("smoothness"), "falloff", 4),
+    scaling=1,
+    crowded=True,
+)
+BACKGROUND = Unit("background", 0.0, 1.0, 0.01, _keep_within(0.0, 1.0), Codec(_between("color"), "color"))
