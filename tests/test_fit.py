@@ -5,17 +5,17 @@ import math
 import numpy as np
 import pytest
 import torch
+from sdf2vec.render.device import Device
 
 import sdf2vec
 from sdf2vec.fit import constraints, loop, losses
+from sdf2vec.fit.initialization import Layers, detail, place
 from sdf2vec.fit.loop import Progress, fit_picture, scaled
-from sdf2vec.fit.placing import Layers, detail, place
 from sdf2vec.fit.presets import PRESETS, RATES, Start
 from sdf2vec.fit.settings import Settings
 from sdf2vec.image import Picture
 from sdf2vec.metrics import mse, psnr
 from sdf2vec.render import culled, device, triton_fused
-from sdf2vec.render.device import Device
 from sdf2vec.render.reference import render
 from sdf2vec.render.tensors import from_scene
 from sdf2vec.shapes import KINDS

@@ -16,7 +16,7 @@ from sdf2vec.fit.settings import Settings
 from sdf2vec.flip import SMOOTH, Softness, appearance, error, flip, flip_map
 from sdf2vec.image import Picture, load, resize
 from sdf2vec.render.draw import draw
-from sdf2vec.render.fused import threads_of_its_own
+from sdf2vec.threads import threads_of_its_own
 
 
 @pytest.fixture(autouse=True)

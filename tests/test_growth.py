@@ -9,10 +9,10 @@ from sdf2vec import Layer, Scene, Shape
 from sdf2vec.fit import growth
 from sdf2vec.fit.adam import Adam
 from sdf2vec.fit.growth import exchange, importance, least, newcomers
+from sdf2vec.fit.initialization import Layers, Places, empty_groups, groups_at
 from sdf2vec.fit.loop import adam
-from sdf2vec.fit.placing import Layers, Places, empty_groups, groups_at
+from sdf2vec.fit.matching_pursuit import WIDTH, find_places
 from sdf2vec.fit.presets import Relocation
-from sdf2vec.fit.pursuit import WIDTH, find_places
 from sdf2vec.render.reference import composite
 from sdf2vec.render.tensors import Group, from_scene, to_scene
 

@@ -254,8 +254,8 @@ class _View:
 
         from ..render import reference
         from ..render.draw import draw
-        from ..render.fused import threads_of_its_own
         from ..render.tensors import from_scene
+        from ..threads import threads_of_its_own
 
         if self.whole:
             pixels: Floats = draw(scene, self.width, self.height).numpy()

@@ -12,8 +12,8 @@ import torch
 
 from ..render.tensors import Group, SceneTensors
 from .adam import Adam
-from .placing import Layers, Places, groups_at, straight
-from .pursuit import find_places
+from .initialization import Layers, Places, groups_at, straight
+from .matching_pursuit import find_places
 
 PROBES = 8  # random images that estimate what a layer does to the picture
 ROOM = 0.8  # size of a new shape, in radii of the disc whose place it takes: its falloff lies outside of that

@@ -14,15 +14,15 @@ import torch
 from ..errors import Sdf2vecError
 from ..image import Picture, premultiply, resize, unpremultiply
 from ..render import fused
-from ..render.device import Device, choose
-from ..render.fused import is_compiled, threads_of_its_own
 from ..render.tensors import Group, SceneTensors, from_scene, on_device, to_scene
 from ..scene import Scene
+from ..threads import threads_of_its_own
 from .adam import Adam
+from .backends import Backend, choose
 from .constraints import project, too_small, widen
 from .growth import exchange, importance, least, newcomers
+from .initialization import Layers, background_of, empty_groups, place
 from .losses import Objective, objective
-from .placing import Layers, background_of, empty_groups, place
 from .presets import CROWDED, CROWDING, LENGTHS, MANY, RATES, Phase, Start
 from .settings import Settings, preset_of, weights_for
 
@@ -80,7 +80,7 @@ class Fit:
     def __init__(self, picture: Picture, settings: Settings, callback: Callback) -> None:
         self.settings, self.callback = settings, callback
         self.preset = preset_of(settings)
-        self.device: Device = choose(settings.device)
+        self.backend: Backend = choose(settings.device)
         self.generator = torch.Generator().manual_seed(settings.seed)
         self.pixels = premultiply(picture.pixels) if picture.has_alpha else picture.pixels
         self.pixel = 1.0 / min(picture.width, picture.height)
@@ -88,7 +88,7 @@ class Fit:
         self.done, self.steps, self.stopped = 0, self._count_steps(), False
         self.tensors = self._start()
         self._announce_compiling()
-        self.tensors = on_device(self.tensors, self.device.name)
+        self.tensors = on_device(self.tensors, self.backend.device)
         self.optimizer = self._adam()
 
     @property
@@ -163,24 +163,26 @@ class Fit:
             exchange(tensors, optimizer, everything, fresh)
 
     def _announce_compiling(self) -> None:
-        if self.device.name == "cpu" and not is_compiled(self.tensors, self.pixels.shape[2]):
+        if not self.backend.is_compiled(self.tensors, self.pixels.shape[2]):
             self.callback(Progress("compiling kernels (once)", 0, self.steps, math.nan))
 
     def _stage(self, phase: Phase) -> Stage:
         resolution = self._resolution(phase)
-        target = scaled(self.pixels, resolution).to(self.device.name)
+        target = scaled(self.pixels, resolution).to(self.backend.device)
         weights = None
         if self.settings.weights is not None:
             height, width = target.shape[1:]
-            weights = torch.from_numpy(weights_for(self.settings.weights, width, height)).to(self.device.name)
-        return Stage(phase, target, weights, objective(phase.loss, target, weights))
+            weights = torch.from_numpy(weights_for(self.settings.weights, width, height)).to(
+                self.backend.device
+            )
+        return Stage(phase, target, weights, objective(phase.loss, target, weights, self.backend.losses))
 
     def _resolution(self, phase: Phase) -> float:
         return self.preset.resolution(phase, self.settings.shapes)
 
     def _draw(self, tensors: SceneTensors, target: torch.Tensor) -> torch.Tensor:
         channels, height, width = target.shape
-        return self.device.composite(tensors, width, height, channels)
+        return self.backend.composite(tensors, width, height, channels)
 
     def _train(self, stage: Stage, moves: Callable[[Group], torch.Tensor] | None = None) -> None:
         """The steps of a phase; `moves` tells which layers of a group are trained, all without it."""
@@ -190,7 +192,7 @@ class Fit:
                 self._relocate(stage, phase.relocation.share)
             loss = self._step(stage, rate, moves)
             self.done += 1
-            if self.callback(Progress(phase.name, self.done, self.steps, loss, self.device.name)):
+            if self.callback(Progress(phase.name, self.done, self.steps, loss, self.backend.device)):
                 self.stopped = True
                 raise Stopped
 

@@ -9,12 +9,12 @@ from functools import cache
 from types import ModuleType
 from typing import NamedTuple
 
+from .. import kernel_cache
 from ..blend import COMPOSITING, coverage, reach, saturation, smooth_union, union_reach
 from ..expr import VEC2, VEC3, VEC4, Expr, Operand, components_of, const, maximum, minimum, scalarize, var
 from ..lower.numba import PREAMBLE, Block, backward, forward, scalar
 from ..shapes import KINDS
 from ..templating import template
-from . import compiled
 
 TILE = 16  # pixels along a side of a tile, the block that kernels work on
 PIXELS = TILE * TILE
@@ -119,9 +119,9 @@ def _both_ways(block: Block, channels: int) -> tuple[str, str]:
 @cache
 def load(layers: tuple[LayerKind, ...], compositing: str, channels: int) -> ModuleType:
     """The compiled module for these kinds of layer and 3 or 4 channels of colour."""
-    return compiled.load(text(layers, compositing, channels))
+    return kernel_cache.load(text(layers, compositing, channels))
 
 
 def is_compiled(layers: tuple[LayerKind, ...], compositing: str, channels: int) -> bool:
     """Whether these kernels have been compiled before on this machine."""
-    return compiled.is_compiled(text(layers, compositing, channels), "backward_tiles")
+    return kernel_cache.is_compiled(load(layers, compositing, channels).backward_tiles)

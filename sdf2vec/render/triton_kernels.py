@@ -8,11 +8,11 @@ from __future__ import annotations
 from functools import cache
 from types import ModuleType
 
+from .. import kernel_cache
 from ..expr import components_of, scalarize
 from ..lower.block import Block
 from ..lower.triton import PREAMBLE, backward, forward
 from ..templating import template
-from . import compiled
 from .kernels import LOOK, PIXELS, TILE, Formula, LayerKind, flows_of, solid
 
 SOLID = -1  # instead of a kind: the layer covers all of the tile, so its formula need not be looked at
@@ -56,4 +56,4 @@ def _both_ways(block: Block, channels: int) -> tuple[str, str]:
 @cache
 def load(layers: tuple[LayerKind, ...], compositing: str, channels: int) -> ModuleType:
     """The module for these kinds of layer; Triton compiles its kernels when they are first launched."""
-    return compiled.load_file(text(layers, compositing, channels))
+    return kernel_cache.load_file(text(layers, compositing, channels))
