@@ -93,7 +93,7 @@ def cache_folder() -> Path:
     return Path(os.environ.get("SDF2VEC_CACHE") or platformdirs.user_cache_path("sdf2vec", appauthor=False))
 
 
-class _Kept(caching.NullCache):  # type: ignore[misc]
+class _Kept(caching.NullCache):
     """The machine code of one kernel, a file for each signature: a digest, then what numba makes of it."""
 
     def __init__(self, function: FunctionType) -> None:

@@ -54,15 +54,15 @@ def _project_look(group: Group, compositing: str) -> None:
     group.smoothness.clamp_(1e-3, LONGEST)
 
 
-def widen(tensors: SceneTensors, least: float) -> None:
+def enforce_min_thickness(tensors: SceneTensors, least: float) -> None:
     """Makes shapes thinner than `least` (scene units) that thick, in place, by the shortest way."""
     for group in tensors.groups:
         for _ in range(NEWTON_STEPS):
-            if not _widen_once(group, least):
+            if not _thicken(group, least):
                 break
 
 
-def _widen_once(group: Group, least: float) -> bool:
+def _thicken(group: Group, least: float) -> bool:
     """A Newton step along the gradient of the thickness; whether there was need."""
     columns = [column.requires_grad_() for column in _columns(group)]
     with torch.enable_grad():

@@ -1,4 +1,4 @@
-"""Which layers leave and which come: those that matter least go, new ones start where most is missing.
+"""Which layers leave and which come: `prune` those that matter least, `densify` where most is missing.
 
 What is decided is pure; `exchange` alone changes a scene, and Adam's state with it.
 """
@@ -13,7 +13,7 @@ import torch
 from ..render.tensors import Group, SceneTensors
 from .adam import Adam
 from .initialization import Layers, Places, groups_at, straight
-from .matching_pursuit import find_places
+from .matching_pursuit import find_discs
 
 PROBES = 8  # random images that estimate what a layer does to the picture
 ROOM = 0.8  # size of a new shape, in radii of the disc whose place it takes: its falloff lies outside of that
@@ -60,7 +60,7 @@ def _linear_in(group: Group, tensors: SceneTensors) -> list[torch.Tensor]:
     return [group.colors, group.opacity] if tensors.transparent else [group.colors]
 
 
-def least(scores: Sequence[torch.Tensor], count: int) -> list[torch.Tensor]:
+def prune(scores: Sequence[torch.Tensor], count: int) -> list[torch.Tensor]:
     """For each group, the rows that stay when the `count` layers with the lowest scores go."""
     flat = torch.cat(list(scores))
     stays = torch.ones(len(flat), dtype=torch.bool)
@@ -69,7 +69,7 @@ def least(scores: Sequence[torch.Tensor], count: int) -> list[torch.Tensor]:
     return [part.nonzero()[:, 0] for part in parts]
 
 
-def newcomers(
+def densify(
     image: torch.Tensor,
     target: torch.Tensor,
     count: int,
@@ -84,7 +84,7 @@ def newcomers(
     """
     image, target = image.detach().cpu(), target.cpu()
     residual = target - image if weights is None else (target - image) * weights.cpu()
-    found = find_places(residual, count)
+    found = find_discs(residual, count)
     height, width = target.shape[1:]
     centers = (found.centers / torch.tensor([width, height]) - 0.5) * torch.tensor(tensors.size)
     sizes = found.radii * ROOM * (tensors.size[0] / width)
@@ -95,6 +95,13 @@ def newcomers(
     else:
         colors = straight(image[:, row, column].T + found.amounts)
     return groups_at(Places(centers, sizes, colors), layers, generator, first=tensors.layer_count)
+
+
+def relocate(
+    tensors: SceneTensors, optimizer: Adam, scores: Sequence[torch.Tensor], fresh: Sequence[Group]
+) -> None:
+    """Puts new layers in place of as many with the lowest scores ([G] for each group)."""
+    exchange(tensors, optimizer, prune(scores, sum(len(group.order) for group in fresh)), fresh)
 
 
 def exchange(

@@ -15,7 +15,7 @@ from .presets import Start
 UNIFORM_SHARE = 0.35  # of the shapes goes anywhere, the rest where the picture changes
 CANDIDATES = 8  # positions tried for each shape; the one farthest from the others, in their sizes, is taken
 FALLOFF = 0.4  # of a shape's size
-LARGEST = 0.35  # size of a shape, for a canvas of area 1
+LARGEST_SIZE = 0.35  # size of a shape, for a canvas of area 1
 OPACITY = 0.8  # under `over`, of an opaque picture
 SMOOTHNESS = 0.25  # of a smooth union, of the size of its layer
 
@@ -118,7 +118,7 @@ def _spread(
     room = (
         (area / (density.flatten()[picked] * count * math.pi))
         .sqrt()
-        .clamp(max=LARGEST * math.sqrt(size[0] * size[1]))
+        .clamp(max=LARGEST_SIZE * math.sqrt(size[0] * size[1]))
     )
     points = torch.stack([x, y], dim=1).reshape(count, CANDIDATES, 2)
     room = room.reshape(count, CANDIDATES)

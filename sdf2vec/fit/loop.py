@@ -11,6 +11,7 @@ from functools import partial
 import numpy as np
 import torch
 
+from ..deferred import deferred
 from ..errors import Sdf2vecError
 from ..image import Picture, premultiply, resize, unpremultiply
 from ..render import fused
@@ -19,18 +20,21 @@ from ..scene import Scene
 from ..threads import threads_of_its_own
 from .adam import Adam
 from .backends import Backend, choose
-from .constraints import project, too_small, widen
-from .growth import exchange, importance, least, newcomers
+from .constraints import enforce_min_thickness, project, too_small
+from .growth import densify, exchange, importance, prune, relocate
 from .initialization import Layers, background_of, empty_groups, place
 from .losses import Objective, objective
 from .presets import CROWDED, CROWDING, LENGTHS, MANY, RATES, Phase, Start
 from .settings import Settings, preset_of, weights_for
 
-WIDEN_EVERY = 10  # steps
+THICKEN_EVERY = 10  # steps
 AREA_WEIGHT = 1.0  # of the area constraint in the loss
 TRIAL_LAYERS, TRIAL_STEPS, TRIAL_RATE = 4, 60, 0.5
 REFIT_STEPS = 100  # after the colours have been restricted
 ANYWHERE = Start("uniform")
+restrict_colors: Callable[..., None] = deferred(
+    "sdf2vec.fit.palette", "restrict"
+)  # scipy: most fits don't need it
 SAME_SHAPE = 0.01  # scene units by which a start scene's canvas may differ
 
 
@@ -75,7 +79,7 @@ class Stage:
 
 
 class Fit:
-    """A scene on its way to a picture."""
+    """What a fit works with: settings, the picture's pixels, the scene as it is now, the optimiser."""
 
     def __init__(self, picture: Picture, settings: Settings, callback: Callback) -> None:
         self.settings, self.callback = settings, callback
@@ -107,7 +111,7 @@ class Fit:
             if not self.stopped:
                 with suppress(Stopped):
                     self._refit(stage)
-        widen(self.tensors, self.pixel)
+        enforce_min_thickness(self.tensors, self.pixel)
 
     def _train_all(self) -> None:
         """All phases and trials."""
@@ -154,12 +158,12 @@ class Fit:
             scores = importance(image, tensors, self.generator)
             sizes = torch.cat([torch.full((len(group.order),), group.union_size) for group in tensors.groups])
             taken = sizes[torch.cat(scores).argsort(stable=True)].cumsum(0)
-            exchange(tensors, optimizer, least(scores, int((taken < spare).sum()) + 1), ())
+            exchange(tensors, optimizer, prune(scores, int((taken < spare).sum()) + 1), ())
         count = (self.settings.shapes - _shape_count(tensors)) // self.settings.union
         if count > 0:
             image = fused.composite(tensors, target.shape[2], target.shape[1], len(target))
             everything = [torch.arange(len(group.order)) for group in tensors.groups]
-            fresh = newcomers(image, target, count, tensors, _layers_of(self.settings), self.generator)
+            fresh = densify(image, target, count, tensors, _layers_of(self.settings), self.generator)
             exchange(tensors, optimizer, everything, fresh)
 
     def _announce_compiling(self) -> None:
@@ -207,8 +211,8 @@ class Fit:
             _freeze(self.tensors, moves)
         self.optimizer.step(rate)
         project(self.tensors, self.pixel, self.preset.falloff)
-        if self.done % WIDEN_EVERY == 0:
-            widen(self.tensors, self.pixel)
+        if self.done % THICKEN_EVERY == 0:
+            enforce_min_thickness(self.tensors, self.pixel)
         return float(value.detach())
 
     def _try(self, stage: Stage) -> None:
@@ -225,7 +229,7 @@ class Fit:
         )
         for group in places.groups:
             group.order += self.tensors.layer_count
-        exchange(self.tensors, self.optimizer, least(scores, count), places.groups)
+        relocate(self.tensors, self.optimizer, scores, places.groups)
         first = self.tensors.layer_count - count
         phase = Phase("trial", TRIAL_STEPS, stage.phase.resolution, rate=TRIAL_RATE, end_rate=0.05)
         self.optimizer = self._adam()
@@ -240,11 +244,8 @@ class Fit:
 
     def _restrict_colors(self, stage: Stage) -> None:
         """To the palette given or, of so many colours, the best."""
-        from .palette import found, snap  # loads scipy, which most fits don't need
-
         cover = importance(self._draw(self.tensors, stage.target), self.tensors, self.generator)
-        palette = self.settings.palette or found(self.tensors, cover, self.settings.colors, self.generator)
-        snap(self.tensors, list(palette))
+        restrict_colors(self.tensors, cover, self.settings.palette, self.settings.colors, self.generator)
 
     def _refit(self, stage: Stage) -> None:
         """Trains all but the colours."""
@@ -259,8 +260,8 @@ class Fit:
         image = self._draw(self.tensors, stage.target)
         scores = self._scores(image, stage)
         layers = _layers_of(self.settings)
-        fresh = newcomers(image, stage.target, count, self.tensors, layers, self.generator, stage.weights)
-        exchange(self.tensors, self.optimizer, least(scores, count), fresh)
+        fresh = densify(image, stage.target, count, self.tensors, layers, self.generator, stage.weights)
+        relocate(self.tensors, self.optimizer, scores, fresh)
 
     @property
     def _replaceable(self) -> int:
