@@ -420,7 +420,7 @@ OPERATIONS: dict[str, Operation] = {
         _widest,
         *_both(Cell("log(max({0}, 1e-30))")),
         torch="torch.log(torch.where({0} > 1e-30, {0}, 1e-30))",
-        numba="log({0} if {0} > LEAST else LEAST)",
+        numba="fast_log({0})",
         triton="tl.log(tl.maximum({0}, 1e-30))",
         javascript="Math.log(Math.max({0}, 1e-30))",
         value=lambda a: math.log(max(a, 1e-30)),

@@ -16,11 +16,15 @@ equal, and none wherever it clamps. So
   the length of a vector is rounded at 0.
 
 The derivative is finite everywhere, and 0 where the pictures are equal.
+
+What happens at each pixel is written as expressions, which torch runs here and the CPU's loss compiles (`fit.flip`);
+what lies between pixels are linear filters.
 """
 
 from __future__ import annotations
 
 import math
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cache
 from typing import NamedTuple
@@ -29,6 +33,8 @@ import torch
 import torch.nn.functional as F  # noqa: N812
 from torch import Tensor
 
+from .expr import Expr, Operand, const, constant, exp, fixed, log, maximum, minimum, select, sqrt, var
+from .lower.torch import Tensors, compile_torch
 from .metrics import comparable
 
 # --- the paper's constants ----------------------------------------------------------------------------------
@@ -60,8 +66,7 @@ _Y, _CX, _CZ = 0, 1, 2
 LAB_DELTA, LAB_OFFSET = 6 / 29, 4 / 29  # CIELAB: a cube root above δ³, a line below
 
 
-@dataclass(frozen=True)
-class Softness:
+class Softness(NamedTuple):
     """The size below which FLIP is smoothed: of distances in CIELAB units, of differences between features."""
 
     color: float
@@ -96,25 +101,20 @@ def flip_map(image: Tensor, reference: Tensor) -> Tensor:
 
 def appearance(image: Tensor, softness: Softness) -> Appearance:
     """What FLIP compares of [3, H, W], or of [4, H, W] premultiplied. Raises ValueError for another shape."""
-    filters = filters_for(image.dtype, image.device)
-    filtered = filters(_linear(_clamped(over_grounds(image))))  # [B, 8, H, W]
-    opponent, derivatives = filtered.split(4, dim=1)
-    colors = _clamped(_mix(filters.to_rgb, opponent))
-    features = _length(derivatives.unflatten(1, (2, 2)), 2, softness.feature)
-    return Appearance(_lab(_mix(filters.to_xyz, colors)), features)
+    light = _compiled((linear(CODED),), (CODED,))(over_grounds(image))[0]
+    planes = filters_for(image.dtype, image.device)(light)  # [B, 8, H, W]
+    parts = _compiled(seen(PLANES, SOFTNESS[1]), (*PLANES, SOFTNESS[1]))(
+        *planes.unbind(dim=1), softness.feature
+    )
+    return Appearance(torch.stack(parts[:3], dim=1), torch.stack(parts[3:], dim=1))
 
 
 def error(a: Appearance, b: Appearance, softness: Softness) -> Tensor:
     """The final difference, [B, H, W]: the colour error, raised to 1 − the feature error."""
-    difference = a.lab - b.lab
-    distance = difference[:, 0].abs() + _length(difference[:, 1:], 1, softness.color)  # HyAB
-    features = (a.features - b.features).abs().amax(dim=1) / math.sqrt(2)
-    exponent = 1 - _power(features, FEATURE_EXPONENT, softness.feature)
-    large = _redistributed(distance.clamp(min=softness.color) ** COLOR_EXPONENT)
-    return large**exponent * _toe(distance, COLOR_EXPONENT * exponent, softness.color)
-
-
-# --- colours ------------------------------------------------------------------------------------------------
+    numbers = (part for x in (a, b) for planes in x for part in planes.unbind(dim=1))
+    inputs = (*LOOK, *OTHER_LOOK, *SOFTNESS)
+    found: Tensor = _compiled((difference(LOOK, OTHER_LOOK, *SOFTNESS),), inputs)(*numbers, *softness)[0]
+    return found
 
 
 def over_grounds(image: Tensor) -> Tensor:
@@ -125,66 +125,111 @@ def over_grounds(image: Tensor) -> Tensor:
     return torch.stack([color, color + (1 - alpha)]) if len(alpha) else color[None]
 
 
-def _clamped(values: Tensor) -> Tensor:
+# --- what happens at a pixel, as expressions ------------------------------------------------------------------
+
+Look = tuple[Expr, ...]  # of a pixel: the five numbers of `Appearance`
+
+
+def linear(coded: Expr) -> Expr:
+    """Linear light of an sRGB-coded value (IEC 61966-2-1), clamped to 0..1."""
+    value = _clamped(coded)
+    power = _power((maximum(value, 0.04045) + 0.055) / 1.055, 2.4)
+    return select(value > 0.04045, power, value / 12.92)
+
+
+def seen(planes: Sequence[Expr], softness: Expr) -> Look:
+    """How a pixel looks, by what the eight filters give there; `softness` of features."""
+    brightness, red_green, wide, narrow = planes[:4]
+    opponent = brightness, red_green, wide + narrow
+    colors = [_clamped(value) for value in _mixed(_to_rgb().tolist(), opponent)]
+    edge, point = (_length(planes[i], planes[i + 1], softness) for i in (4, 6))
+    return (*_lab(_mixed(_XYZ, colors)), edge, point)
+
+
+def difference(a: Look, b: Look, color_softness: Expr, feature_softness: Expr) -> Expr:
+    """FLIP of a pixel by how it looks in the two pictures."""
+    features = maximum(*(_magnitude(a[i] - b[i]) for i in (4, 3))) * math.sqrt(0.5)
+    exponent = 1.0 - _soft_power(features, FEATURE_EXPONENT, feature_softness)
+    distance = _hyab(a, b, color_softness)
+    large = _redistributed(_power(maximum(distance, color_softness), COLOR_EXPONENT))
+    return _power(large, exponent) * _toe(distance, COLOR_EXPONENT * exponent, color_softness)
+
+
+def _clamped(value: Expr) -> Expr:
     """Clamped to 0..1, with the derivative of what was not clamped."""
-    still = values.detach()
-    return still.clamp(0, 1) + (values - still)
+    return fixed(minimum(maximum(value, 0.0), 1.0)) + (value - fixed(value))
 
 
-def _linear(coded: Tensor) -> Tensor:
-    """sRGB-coded 0..1 to linear (IEC 61966-2-1)."""
-    return torch.where(coded <= 0.04045, coded / 12.92, ((coded + 0.055) / 1.055) ** 2.4)
+def _mixed(matrix: Sequence[Sequence[float]], vector: Sequence[Expr]) -> list[Expr]:
+    """A vector by a matrix."""
+    return [sum((x * weight for weight, x in zip(row, vector, strict=True)), const(0.0)) for row in matrix]
 
 
-def _lab(xyz: Tensor) -> Tensor:
-    """CIELAB of XYZ relative to white, with the Hunt effect: colours fade with lightness. [B, 3, H, W]."""
+def _lab(xyz: Sequence[Expr]) -> Look:
+    """CIELAB of XYZ relative to white, with the Hunt effect: colours fade with lightness."""
     dark = 1 / (3 * LAB_DELTA**2)
-    root = torch.where(xyz > LAB_DELTA**3, xyz.clamp(min=LAB_DELTA**3) ** (1 / 3), dark * xyz + LAB_OFFSET)
-    x, y, z = root.unbind(dim=1)
-    lightness = 116 * y - 16
-    return torch.stack([lightness, 5 * lightness * (x - y), 2 * lightness * (y - z)], dim=1)
+    x, y, z = (
+        select(v > LAB_DELTA**3, _power(maximum(v, LAB_DELTA**3), 1 / 3), v * dark + LAB_OFFSET) for v in xyz
+    )
+    lightness = 116.0 * y - 16.0
+    return lightness, 5.0 * lightness * (x - y), 2.0 * lightness * (y - z)
 
 
-def _mix(matrix: Tensor, planes: Tensor) -> Tensor:
-    """Every pixel's vector by a matrix [M, N]: [B, N, H, W] to [B, M, H, W]."""
-    mixed: Tensor = (matrix @ planes.flatten(2)).unflatten(2, planes.shape[2:])
-    return mixed
+def _hyab(a: Look, b: Look, softness: Operand) -> Expr:
+    """The distance of two colours in CIELAB: along lightness, and across."""
+    return _magnitude(a[0] - b[0]) + _length(a[1] - b[1], a[2] - b[2], softness)
 
 
-# --- the errors' scale --------------------------------------------------------------------------------------
-
-
-def _redistributed(powered: Tensor) -> Tensor:
+def _redistributed(powered: Expr) -> Expr:
     """Colour distances, to the power of q_c, mapped to 0..1: most of the range to the small ones."""
     largest = largest_distance() ** COLOR_EXPONENT
     turn = TURNING_SHARE * largest
     small = powered * (TURNING_ERROR / turn)
     large = TURNING_ERROR + (powered - turn) * ((1 - TURNING_ERROR) / (largest - turn))
-    return torch.minimum(small, large)  # as the first one is steeper
+    return minimum(small, large)  # as the first one is steeper
 
 
 @cache
 def largest_distance() -> float:
     """Between green and blue, by HyAB."""
-    primaries = torch.tensor(_XYZ, dtype=torch.float64)[:, 1:].T[:, :, None, None]
-    light, *chroma = (_lab(primaries)[0] - _lab(primaries)[1]).flatten().tolist()
-    return float(abs(light) + math.hypot(*chroma))
+    _, green, blue = (_lab([const(row[i]) for row in _XYZ]) for i in range(3))
+    return constant(_hyab(green, blue, 0.0))
 
 
-def _power(x: Tensor, exponent: float, softness: float) -> Tensor:
+def _power(x: Expr, exponent: Operand) -> Expr:
+    return exp(exponent * log(x))
+
+
+def _soft_power(x: Expr, exponent: float, softness: Expr) -> Expr:
     """x to a power below 1, for x ≥ 0, with a finite slope at 0."""
-    return x.clamp(min=softness) ** exponent * _toe(x, exponent, softness)
+    return _power(maximum(x, softness), exponent) * _toe(x, exponent, softness)
 
 
-def _toe(x: Tensor, exponent: Tensor | float, softness: float) -> Tensor:
+def _toe(x: Expr, exponent: Operand, softness: Expr) -> Expr:
     """What turns a constant power into a parabola below the softness: 1 above it, 0 at 0."""
-    t = (x / softness).clamp(max=1)
-    return t * (2 - exponent - (1 - exponent) * t)
+    t = minimum(x / softness, 1.0)
+    return t * (2.0 - exponent - (1.0 - exponent) * t)
 
 
-def _length(vectors: Tensor, dim: int, softness: float) -> Tensor:
-    """Euclidean lengths, rounded at 0."""
-    return (vectors.square().sum(dim=dim) + softness**2).sqrt() - softness
+def _magnitude(x: Expr) -> Expr:
+    """|x|, with derivative 0 at 0."""
+    return x * fixed(select(x > 0.0, 1.0, select(x < 0.0, -1.0, 0.0)))
+
+
+def _length(x: Expr, y: Expr, softness: Operand) -> Expr:
+    """The length of a vector, rounded at 0."""
+    return sqrt(x * x + y * y + softness * softness) - softness
+
+
+CODED = var("coded")
+PLANES = tuple(var(f"plane{i}") for i in range(8))
+LOOK, OTHER_LOOK = (tuple(var(f"{side}{i}") for i in range(5)) for side in ("look", "other"))
+SOFTNESS = var("color_softness"), var("feature_softness")
+
+
+@cache
+def _compiled(outputs: tuple[Expr, ...], inputs: tuple[Expr, ...]) -> Callable[..., Tensors]:
+    return compile_torch(outputs, inputs)
 
 
 # --- filters ------------------------------------------------------------------------------------------------
@@ -201,14 +246,12 @@ class Filters:
     to_planes: Tensor  # [8, 3] from linear RGB
     across: Tensor  # [8, 1, 1, K]
     down: Tensor  # [8, 1, K, 1]
-    to_rgb: Tensor  # [3, 4] linear RGB from the first four planes
-    to_xyz: Tensor  # [3, 3] from linear RGB
 
     def __call__(self, linear: Tensor) -> Tensor:
         """[B, 3, H, W] to [B, 8, H, W]."""
         reach = self.across.shape[3] // 2
         padded = F.pad(linear, (reach, reach, reach, reach), mode="replicate")
-        planes = _mix(self.to_planes, padded)
+        planes: Tensor = (self.to_planes @ padded.flatten(2)).unflatten(2, padded.shape[2:])
         for kernels in (self.across, self.down):
             planes = F.conv2d(planes, kernels, groups=len(kernels))
         return planes
@@ -218,17 +261,23 @@ class Filters:
 def filters_for(dtype: torch.dtype, device: torch.device) -> Filters:
     """FLIP's filters for pictures of a type on a device."""
     planes, across, down = zip(*_bank(), strict=True)
-    to_xyz = torch.tensor(_XYZ, dtype=torch.float64)
-    to_opponent = torch.tensor(_OPPONENT, dtype=torch.float64) @ to_xyz
-    to_rgb = torch.linalg.inv(to_opponent)[:, planes[:4]]
     tensors = (
-        to_opponent[planes, :],
+        _to_opponent()[planes, :],
         torch.stack(across)[:, None, None, :],
         torch.stack(down)[:, None, :, None],
-        to_rgb,
-        to_xyz,
     )
     return Filters(*(tensor.to(device, dtype).contiguous() for tensor in tensors))
+
+
+def _to_opponent() -> Tensor:
+    """From linear RGB, [3, 3]."""
+    return torch.tensor(_OPPONENT, dtype=torch.float64) @ torch.tensor(_XYZ, dtype=torch.float64)
+
+
+def _to_rgb() -> Tensor:
+    """Linear RGB from the opponent planes, [3, 3]."""
+    inverse: Tensor = torch.linalg.inv(_to_opponent())
+    return inverse
 
 
 def _bank() -> list[tuple[int, Tensor, Tensor]]:

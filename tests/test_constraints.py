@@ -7,7 +7,7 @@ import torch
 
 from sdf2vec import Layer, Scene, Shape
 from sdf2vec.expr import VEC2, components_of, var
-from sdf2vec.fit.constraints import areas, too_small, widen
+from sdf2vec.fit.constraints import areas, enforce_min_thickness, too_small
 from sdf2vec.lower.torch import compile_torch
 from sdf2vec.render.tensors import SceneTensors, from_scene
 from sdf2vec.shapes import KINDS
@@ -132,7 +132,7 @@ def test_thin_triangles_become_as_thick_as_asked_and_others_stay():
     circle, group = sorted(tensors.groups, key=lambda group: group.kind)
     before, thick, others = flat(group), heights(group) >= least * (1 + 1e-5), circle.each(torch.clone)
     assert 50 < int(thick.sum()) < 450
-    widen(tensors, least)
+    enforce_min_thickness(tensors, least)
     after = flat(group)
     assert torch.equal(after[thick], before[thick])
     assert float(heights(group).min()) >= least * (1 - 1e-3)
@@ -141,11 +141,11 @@ def test_thin_triangles_become_as_thick_as_asked_and_others_stay():
     assert all(torch.equal(a, b) for (_, a), (_, b) in zip(circle.tensors(), others.tensors(), strict=True))
 
 
-def test_round_shapes_are_widened_too():
+def test_round_shapes_are_thickened_too():
     tensors = tensors_of(
         ("circle", (0, 0, 0.001)), ("ellipse", (0, 0, 0.3, 0.001, 1)), ("box", (0, 0, 0.001, 0.001, 1, 0))
     )
-    widen(tensors, 0.02)
+    enforce_min_thickness(tensors, 0.02)
     circle, ellipse, box = tensors.groups
     assert float(circle.parameters["radius"]) == pytest.approx(0.01)
     assert ellipse.parameters["radii"].flatten().tolist() == pytest.approx([0.3, 0.01])

@@ -1,21 +1,21 @@
 """The fit: it lowers its losses, keeps its promises, and is the same twice."""
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
 import torch
 
 import sdf2vec
-from sdf2vec.fit import constraints, loop, losses
+from sdf2vec.fit import backends, constraints, loop, losses
+from sdf2vec.fit.initialization import Layers, detail, place
 from sdf2vec.fit.loop import Progress, fit_picture, scaled
-from sdf2vec.fit.placing import Layers, detail, place
 from sdf2vec.fit.presets import PRESETS, RATES, Start
 from sdf2vec.fit.settings import Settings
 from sdf2vec.image import Picture
 from sdf2vec.metrics import mse, psnr
-from sdf2vec.render import culled, device, triton_fused
-from sdf2vec.render.device import Device
+from sdf2vec.render import culled, triton_fused
 from sdf2vec.render.reference import render
 from sdf2vec.render.tensors import from_scene
 from sdf2vec.shapes import KINDS
@@ -168,16 +168,16 @@ def test_a_device_that_is_not_there_is_refused_in_one_line():
 @pytest.fixture
 def torch_with_cuda(monkeypatch):
     """A torch that claims to have CUDA; tensors made for it land on the CPU."""
-    device._cuda_that_works.cache_clear()
+    backends._cuda_works.cache_clear()
     monkeypatch.setattr(torch.cuda, "is_available", lambda: True)
-    monkeypatch.setattr(device, "from_scene", lambda scene, device: from_scene(scene))
+    monkeypatch.setattr(backends, "from_scene", lambda scene, device: from_scene(scene))
     yield
-    device._cuda_that_works.cache_clear()
+    backends._cuda_works.cache_clear()
 
 
 def test_auto_takes_cuda_where_its_kernels_run(monkeypatch, torch_with_cuda):
     monkeypatch.setattr(triton_fused, "composite", culled.composite)
-    assert device.choose("auto") == Device("cuda", culled.composite)
+    assert backends.choose("auto") is backends.CUDA
 
 
 def test_auto_takes_the_cpu_and_says_why_where_cudas_kernels_fail(monkeypatch, torch_with_cuda):
@@ -188,13 +188,13 @@ def test_auto_takes_the_cpu_and_says_why_where_cudas_kernels_fail(monkeypatch, t
     with pytest.warns(
         RuntimeWarning, match=r"CUDA's kernels don't run here \(no kernel image is available\)$"
     ):
-        assert device.choose("auto").name == "cpu"
-    assert device.choose("cuda") == Device("cuda", culled.composite)
+        assert backends.choose("auto") is backends.CPU
+    assert backends.choose("cuda") is backends.CUDA_BY_TORCH
 
 
 def test_the_dense_renderer_serves_other_devices(monkeypatch):
     """What `mps` runs, run on the CPU: nearly the same scene as the fused kernels give."""
-    monkeypatch.setattr(loop, "choose", {"mps": Device("cpu", culled.composite)}.__getitem__)
+    monkeypatch.setattr(loop, "choose", {"mps": replace(backends.MPS, device="cpu")}.__getitem__)
     pic = picture()
     scene = fit_picture(pic, Settings(4, ("circle",), preset="fast", device="mps"))
     monkeypatch.undo()

@@ -10,13 +10,12 @@ import torch
 from sdf2vec import flip as module
 from sdf2vec.fit.flip import Flip
 from sdf2vec.fit.loop import fit_picture
-from sdf2vec.fit.losses import LOSSES
 from sdf2vec.fit.presets import PRESETS, Phase, Preset
 from sdf2vec.fit.settings import Settings
 from sdf2vec.flip import SMOOTH, Softness, appearance, error, flip, flip_map
 from sdf2vec.image import Picture, load, resize
 from sdf2vec.render.draw import draw
-from sdf2vec.render.fused import threads_of_its_own
+from sdf2vec.threads import threads_of_its_own
 
 
 @pytest.fixture(autouse=True)
@@ -146,7 +145,7 @@ def test_other_shapes_are_refused(shapes):
 
 def loss_and_gradient(render, target):
     """What fits use: float32, by the kernels."""
-    return differentiated(LOSSES["flip"](target.float()), render.float())
+    return differentiated(Flip(target.float()), render.float())
 
 
 @pytest.mark.parametrize("pair", PAIRS)
@@ -180,11 +179,6 @@ def test_the_kernels_compute_what_torch_does_below_the_softness(monkeypatch):
     value, gradient = differentiated(Flip(target), render)
     assert value == pytest.approx(expected, abs=1e-6)
     np.testing.assert_allclose(gradient, exact, atol=1e-4 * float(exact.abs().max()))
-
-
-def test_another_type_takes_torch():
-    target = noise(3, 8, 8, dtype=torch.float64)
-    assert LOSSES["flip"](target)(1 - target).dtype == torch.float64
 
 
 def pale(*shape, seed):

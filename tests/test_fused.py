@@ -1,8 +1,4 @@
-"""The fused renderer against the reference in float64: values, derivatives, threads, cache."""
-
-import os
-import subprocess
-import sys
+"""The fused renderer against the reference in float64: values, derivatives, threads."""
 
 import pytest
 import torch
@@ -12,7 +8,7 @@ from hypothesis import strategies as st
 from sdf2vec import Layer, Scene, Shape
 from sdf2vec.fit.ssim import Dissimilarity
 from sdf2vec.metrics import ssim
-from sdf2vec.render import compiled, draw, fused, kernels, reference
+from sdf2vec.render import draw, fused, kernels, reference
 from sdf2vec.render.kernels import LayerKind
 from sdf2vec.render.tensors import from_scene
 from sdf2vec.shapes import KINDS
@@ -169,45 +165,6 @@ def test_a_text_holds_only_the_kinds_it_is_for():
     assert not any(f"# {kind}," in text for kind in KINDS if kind != "circle")
 
 
-def test_the_cache_key_changes_with_the_formula(monkeypatch):
-    before = compiled.path_of(kernels.text((LayerKind("circle", 1),), "over", 3))
-    assert before == compiled.path_of(kernels.text((LayerKind("circle", 1),), "over", 3))
-    assert before != compiled.path_of(kernels.text((LayerKind("circle", 1),), "additive", 3))
-    monkeypatch.setattr("numba.__version__", "0")
-    assert before != compiled.path_of(kernels.text((LayerKind("circle", 1),), "over", 3))
-
-
-RUN = """
-import sys, warnings
-warnings.simplefilter("always")
-from sdf2vec.render import compiled
-source = "from numba import njit\\n@njit(cache=CACHE)\\ndef f(x):\\n    return x + 1\\n"
-print(compiled.load(source).f(1), compiled.is_compiled(source, "f"))
-compiled.load(source.replace("+ 1", "+ 2"))
-"""
-
-
-def run(folder):
-    environment = {**os.environ, "SDF2VEC_CACHE": str(folder)}
-    return subprocess.run(
-        [sys.executable, "-c", RUN], env=environment, capture_output=True, text=True, check=True
-    )
-
-
-def test_kernels_are_kept_in_the_cache_folder(tmp_path):
-    assert run(tmp_path / "new").stdout.split() == ["2", "True"]
-    assert len(list((tmp_path / "new").glob("kernels_*.py"))) == 2
-    assert list((tmp_path / "new" / "__pycache__").glob("*.nbi"))
-
-
-def test_without_a_cache_folder_kernels_work_with_one_warning(tmp_path):
-    (tmp_path / "file").write_text("not a folder")
-    result = run(tmp_path / "file" / "inside")
-    assert result.stdout.split() == ["2", "False"]
-    assert result.stderr.count("RuntimeWarning") == 1
-    assert "compiled anew in every run" in result.stderr
-
-
 def test_kernel_text_is_plain_python():
     text = kernels.text(tuple(LayerKind(kind, size) for kind in KINDS for size in (1, 2)), "over", 4)
     compile(text, "kernels", "exec")
@@ -220,29 +177,3 @@ def test_large_scenes_are_drawn_by_the_fused_renderer_and_look_the_same(monkeypa
     assert torch.equal(dense, reference.render(scene, 50, 40))
     monkeypatch.setattr(draw, "LARGE", 0)
     assert 0.0 < float((draw.draw(scene, 50, 40) - dense).abs().max()) <= VALUES
-
-
-FIT = """
-import sys, hashlib, numpy, torch, sdf2vec
-from sdf2vec.render import draw, fused
-from sdf2vec.render.tensors import from_scene
-pixels = numpy.random.default_rng(0).random((40, 60, 3))
-if sys.argv[1] == "draw first":
-    one = sdf2vec.Shape.of("circle", (1, 0, 0), center=(0, 0), radius=0.3)
-    with torch.no_grad():
-        fused.composite(from_scene(sdf2vec.Scene(9, 9, (sdf2vec.Layer((one,), 0.1),))), 9, 9)
-print(hashlib.sha256(sdf2vec.dumps(sdf2vec.fit(pixels, 9, kind="circle", preset="fast")).encode()).hexdigest())
-"""
-
-
-def test_kernels_from_disk_and_fresh_ones_give_the_same_scene(tmp_path):
-    """Kernels compiled now, read back, or compiled partly in another run: the same digits."""
-    runs = [("new", "fit"), ("new", "fit"), ("partly", "draw first"), ("partly", "fit")]
-    results = []
-    for folder, what in runs:
-        environment = {**os.environ, "SDF2VEC_CACHE": str(tmp_path / folder)}
-        command = [sys.executable, "-c", FIT, what]
-        results.append(
-            subprocess.run(command, env=environment, capture_output=True, text=True, check=True).stdout
-        )
-    assert len(set(results)) == 1

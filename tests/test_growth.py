@@ -8,11 +8,11 @@ import torch
 from sdf2vec import Layer, Scene, Shape
 from sdf2vec.fit import growth
 from sdf2vec.fit.adam import Adam
-from sdf2vec.fit.growth import exchange, importance, least, newcomers
+from sdf2vec.fit.growth import densify, exchange, importance, prune
+from sdf2vec.fit.initialization import Layers, Places, empty_groups, groups_at
 from sdf2vec.fit.loop import adam
-from sdf2vec.fit.placing import Layers, Places, empty_groups, groups_at
+from sdf2vec.fit.matching_pursuit import WIDTH, find_discs
 from sdf2vec.fit.presets import Relocation
-from sdf2vec.fit.pursuit import WIDTH, find_places
 from sdf2vec.render.reference import composite
 from sdf2vec.render.tensors import Group, from_scene, to_scene
 
@@ -78,13 +78,13 @@ def test_importance_of_a_layer_that_shows_nowhere_is_nothing():
     assert scores[1].shape == (0,)
 
 
-def test_the_least_go():
-    stays = least([torch.tensor([3.0, 0.5, 9.0]), torch.tensor([]), torch.tensor([1.0, 0.1])], 3)
+def test_what_matters_least_is_pruned():
+    stays = prune([torch.tensor([3.0, 0.5, 9.0]), torch.tensor([]), torch.tensor([1.0, 0.1])], 3)
     assert [rows.tolist() for rows in stays] == [[0, 2], [], []]
-    assert [rows.tolist() for rows in least([torch.tensor([1.0, 1.0, 1.0])], 2)] == [
+    assert [rows.tolist() for rows in prune([torch.tensor([1.0, 1.0, 1.0])], 2)] == [
         [2]
     ]  # ties: the first ones
-    assert [rows.tolist() for rows in least([torch.tensor([1.0, 2.0])], 0)] == [[0, 1]]
+    assert [rows.tolist() for rows in prune([torch.tensor([1.0, 2.0])], 0)] == [[0, 1]]
 
 
 # --- exchange ----------------------------------------------------------------------------------------------
@@ -194,7 +194,7 @@ def test_adam_is_torchs_own():
     assert not torch.allclose(ours, start, atol=0.1)
 
 
-# --- newcomers and pursuit ---------------------------------------------------------------------------------
+# --- densify: matching pursuit ---------------------------------------------------------------------------------
 
 
 def blob(
@@ -208,7 +208,7 @@ def blob(
 
 @pytest.mark.parametrize("radius", [0.8 * 1.4**3, 0.8 * 1.4**6])
 def test_pursuit_finds_a_blob(radius):
-    found = find_places(blob(20.5, 24.5, radius, [0.5, -0.25, 0.125]), 1)
+    found = find_discs(blob(20.5, 24.5, radius, [0.5, -0.25, 0.125]), 1)
     assert found.centers.tolist() == [[20.5, 24.5]]
     assert float(found.radii[0]) == pytest.approx(radius, rel=1e-5)
     assert found.amounts[0].tolist() == pytest.approx([0.35, -0.175, 0.0875], rel=0.02)  # of a disc: 0.7
@@ -217,7 +217,7 @@ def test_pursuit_finds_a_blob(radius):
 @pytest.mark.parametrize("radius", [3.0, 5.0, 9.0])
 def test_pursuit_finds_a_disc(radius):
     disc = (blob(20.5, 18.5, 1, [1.0]) > math.exp(-(radius**2) / (2 * WIDTH**2))).float()
-    found = find_places(disc * torch.tensor([0.4, -0.2, 0.1])[:, None, None], 1)
+    found = find_discs(disc * torch.tensor([0.4, -0.2, 0.1])[:, None, None], 1)
     assert (found.centers - torch.tensor([20.5, 18.5])).abs().max() <= 1
     assert radius / 1.25 < float(found.radii[0]) < radius * 1.25
     assert found.amounts[0].tolist() == pytest.approx([0.4, -0.2, 0.1], rel=0.15)
@@ -226,7 +226,7 @@ def test_pursuit_finds_a_disc(radius):
 def test_pursuit_takes_the_largest_gains_first():
     """The gain is amount² times area: by hand 0.25²·r², so the wide faint one comes before the narrow strong one."""
     residual = blob(12.5, 12.5, 0.8 * 1.4**6, [0.25, 0, 0]) + blob(38.5, 30.5, 0.8 * 1.4**2, [0, 0.6, 0])
-    found = find_places(residual, 2)
+    found = find_discs(residual, 2)
     assert (found.centers - torch.tensor([[12.5, 12.5], [38.5, 30.5]])).abs().max() <= 1
     assert found.amounts[0, 0] == pytest.approx(0.7 * 0.25, rel=0.1)
     assert found.amounts[1, 1] == pytest.approx(0.7 * 0.6, rel=0.1)
@@ -235,7 +235,7 @@ def test_pursuit_takes_the_largest_gains_first():
 @pytest.mark.parametrize("size", [(1, 1), (4, 4), (2, 37)])
 def test_pursuit_gives_as_many_as_asked_and_never_more_than_is_missing(size):
     for count in (0, 1, 50, 200):
-        found = find_places(torch.ones(3, *size), count)
+        found = find_discs(torch.ones(3, *size), count)
         assert (len(found.centers), len(found.radii), found.amounts.shape) == (count, count, (count, 3))
         if count:
             assert float(found.amounts.abs().max()) < 3.0
@@ -245,14 +245,14 @@ def test_pursuit_gives_as_many_as_asked_and_never_more_than_is_missing(size):
 
 @pytest.mark.parametrize("compositing", ["over", "additive"])
 @pytest.mark.parametrize("union", [1, 2])
-def test_newcomers_bring_the_image_nearer_at_once(compositing, union):
+def test_new_layers_bring_the_image_nearer_at_once(compositing, union):
     background = torch.tensor([0.2, 0.3, 0.4])[:, None, None].expand(3, 40, 48)
     target = background + blob(12.5, 10.5, 6, [0.6, 0.2, -0.3]) + blob(34.5, 28.5, 8, [-0.1, 0.5, 0.5])
     tensors = from_scene(Scene(48, 40, (), (0.2, 0.3, 0.4), compositing))
     image = composite(tensors, 48, 40)[:3]
     before = float((image - target).square().mean())
     layers = Layers(("circle",), compositing, union)
-    tensors.groups += newcomers(image, target, 2, tensors, layers, seeded())
+    tensors.groups += densify(image, target, 2, tensors, layers, seeded())
     after = float((composite(tensors, 48, 40)[:3] - target).square().mean())
     assert after < 0.7 * before
     middles = tensors.groups[0].parameters["center"].mean(dim=1)
@@ -260,12 +260,12 @@ def test_newcomers_bring_the_image_nearer_at_once(compositing, union):
     assert (middles - expected).abs().max() < 0.06
 
 
-def test_newcomers_come_where_the_weights_are():
+def test_new_layers_come_where_the_weights_are():
     target = blob(12.5, 10.5, 6, [0.3, 0.3, 0.3]) + blob(34.5, 28.5, 8, [0.5, 0.5, 0.5])
     tensors = from_scene(Scene(48, 40, (), (0, 0, 0)))
     weights = torch.zeros(40, 48)
     weights[:, :24] = 1
-    (group,) = newcomers(torch.zeros(3, 40, 48), target, 1, tensors, CIRCLES, seeded(), weights)
+    (group,) = densify(torch.zeros(3, 40, 48), target, 1, tensors, CIRCLES, seeded(), weights)
     assert group.parameters["center"][0, 0].tolist() == pytest.approx([-11.5 / 40, -9.5 / 40], abs=0.03)
 
 

@@ -6,12 +6,12 @@ import numpy as np
 import pytest
 import torch
 
+from sdf2vec import kernel_cache
 from sdf2vec.engines import ENGINES
 from sdf2vec.expr import FLOAT, OPERATIONS, VEC2, const, function, let, scalarize, select, sigmoid, var, vec2
 from sdf2vec.lower import numba as numba_lowering
 from sdf2vec.lower.shader import GLSL, WGSL, definition, expression, literal, statements, used_functions
 from sdf2vec.lower.torch import compile_torch, source
-from sdf2vec.render import compiled
 
 from .operations import MEANINGS, expected
 
@@ -79,7 +79,7 @@ def numba_operations():
         inputs = tuple(ARGUMENTS[: meaning.arity])
         outputs = scalarize(meaning.build(*inputs))
         blocks[name] = numba_lowering.forward(numba_lowering.Block(f"op_{name}", outputs, inputs, ()))
-    return compiled.load("\n\n".join([numba_lowering.PREAMBLE, *blocks.values()])), size
+    return kernel_cache.load("\n\n".join([numba_lowering.PREAMBLE, *blocks.values()])), size
 
 
 @pytest.mark.parametrize("name", OPERATIONS)

@@ -12,11 +12,11 @@ import numpy as np
 import pytest
 import torch
 
-from sdf2vec import Layer, Scene, Shape
+from sdf2vec import Layer, Scene, Shape, kernel_cache
 from sdf2vec.expr import OPERATIONS, scalarize, var
 from sdf2vec.lower import triton as triton_lowering
 from sdf2vec.lower.block import Block
-from sdf2vec.render import compiled, fused, reference, triton_fused, triton_kernels
+from sdf2vec.render import fused, reference, triton_fused, triton_kernels
 from sdf2vec.render.kernels import LayerKind
 from sdf2vec.render.tensors import from_scene
 from sdf2vec.shapes import KINDS
@@ -65,7 +65,7 @@ def operation_text(name, meaning):
 def test_operation(name):
     meaning = MEANINGS[name]
     texts = [operation_text(*item) for item in MEANINGS.items()]
-    module = compiled.load_file("\n\n".join([triton_lowering.PREAMBLE, *texts]))
+    module = kernel_cache.load_file("\n\n".join([triton_lowering.PREAMBLE, *texts]))
     cases = np.array(meaning.cases, dtype=np.float32)
     given = torch.tensor(np.resize(cases, (SIZE, meaning.arity)).T.copy(), device=DEVICE)
     to = torch.empty((meaning.build(*ARGUMENTS[: meaning.arity]).type.width, SIZE), device=DEVICE)
@@ -229,9 +229,9 @@ def test_a_text_holds_only_the_kinds_it_is_for():
 def test_without_a_cache_folder_kernels_are_in_a_temporary_file(tmp_path, monkeypatch):
     (tmp_path / "file").write_text("not a folder")
     monkeypatch.setenv("SDF2VEC_CACHE", str(tmp_path / "file" / "inside"))
-    compiled._warn_once.cache_clear()
+    kernel_cache._warn_once.cache_clear()
     with pytest.warns(RuntimeWarning, match="anew in every run"):
-        module = compiled.load_file(
+        module = kernel_cache.load_file(
             f"{triton_kernels.text((LayerKind('circle', 1),), 'over', 4)}# {tmp_path}"
         )
     assert module.__file__ is not None

@@ -16,7 +16,7 @@ import numpy as np
 from ..api import render
 from ..files import write_atomically
 from ..image import Picture, encode_png, load, resize
-from ..render.fused import available_cores
+from ..threads import available_cores
 from .chart import Chart, write
 from .fits import Fitted, measured, median, warm_up
 

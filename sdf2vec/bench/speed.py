@@ -21,9 +21,9 @@ from numba import njit
 
 from ..expr import Expr
 from ..files import write_atomically
+from ..fit.initialization import Layers, place
 from ..fit.loop import adam
 from ..fit.losses import l1
-from ..fit.placing import Layers, place
 from ..fit.presets import Start
 from ..fit.ssim import Dissimilarity
 from ..lower.block import dependent, derivatives
@@ -31,6 +31,7 @@ from ..metrics import ssim
 from ..render import fused, kernels, reference
 from ..render.tensors import SceneTensors
 from ..shapes import KINDS
+from ..threads import available_cores, threads_of_its_own
 from .chart import Chart, write
 
 
@@ -87,7 +88,7 @@ def against_dense() -> Iterator[str]:
     for kind in (*KINDS, "mixed"):
         kinds = list(KINDS) if kind == "mixed" else [kind]
         slow = seconds(step(scene(kinds, 256, target), target, dense=True), least=0.1)
-        with fused.threads_of_its_own():
+        with threads_of_its_own():
             fast = seconds(step(scene(kinds, 256, target), target, dense=False))
         yield f"| {kind} | {slow * 1e3:.0f} | {fast * 1e3:.1f} | {slow / fast:.0f} |"
 
@@ -111,7 +112,7 @@ def per_shape_pixel() -> Iterator[str]:
         def run(tensors: SceneTensors = tensors, weights: torch.Tensor = weights) -> None:
             fused.composite(tensors, 256, 256, 3).backward(weights)
 
-        with fused.threads_of_its_own():
+        with threads_of_its_own():
             spent = seconds(run)
         inside, covered = pixels_in_extents(tensors, 256), covered_pixels(tensors, 256)
         share = operations(kind) * inside / spent / 1e9 / peak
@@ -183,7 +184,7 @@ def growth() -> Iterator[Grown]:
         for side in (128, 256, 512, 1024):
             target = picture(side)
             tensors = scene(["triangle"], count, target)
-            with fused.threads_of_its_own():
+            with threads_of_its_own():
                 spent = seconds(step(tensors, target, dense=False), least=0.3)
                 bins = fused.bins_of(tensors, side, side)
             peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024
@@ -214,7 +215,7 @@ def page(grown: Sequence[Grown], chart: str) -> str:
     """All tables."""
     sections = (
         "# Speed of the fused renderer",
-        f"    python -m sdf2vec.bench.speed -o docs/speed.md\n\nOn {fused.available_cores()} CPU cores.",
+        f"    python -m sdf2vec.bench.speed -o docs/speed.md\n\nOn {available_cores()} CPU cores.",
         "## One step of a fit against the same step in dense torch\n\n256 shapes at 256 × 256, `over`: forward, "
         "L1 and SSIM, backward, Adam.",
         "\n".join(against_dense()),

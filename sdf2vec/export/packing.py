@@ -25,10 +25,10 @@ from ..layer import JOIN, LOOK, slots
 from ..paints import PAINTS
 from ..render import reference
 from ..render.draw import draw, is_large
-from ..render.fused import threads_of_its_own
 from ..render.tensors import from_scene
 from ..scene import Joint, Layer, Scene, Shape
 from ..shapes import KINDS
+from ..threads import threads_of_its_own
 from ..units import ANGLE, COLOR_DECIMALS, FREQUENCY, GEOMETRY_DECIMALS, Fractions, Parameter
 from .records import Variant, joins_of, variant_of, variants_of
 from .tiles import Grid, layer_bounds
@@ -303,12 +303,20 @@ class _Packer:
             coder.fill(start + self.layout.longest(coder.precision, coder.count))
         color, *own = (values[parameter] for parameter in PAINTS[shape.paint].parameters)
         row = [value for parameter in KINDS[shape.kind].parameters for value in values[parameter]]
-        return said, Shape(shape.kind, tuple(row), (color[0], color[1], color[2]), shape.paint, tuple(v for part in own for v in part))
+        return said, Shape(
+            shape.kind,
+            tuple(row),
+            (color[0], color[1], color[2]),
+            shape.paint,
+            tuple(v for part in own for v in part),
+        )
 
     def _box(self, cells: tuple[int, ...]) -> tuple[Limits, Limits]:
         """Low corner and size of a layer's cells, in scene units."""
         low = [c / self.grid.per_unit + start for c, start in zip(cells[:2], self.grid.low, strict=True)]
-        high = [(c + 1) / self.grid.per_unit + start for c, start in zip(cells[2:], self.grid.low, strict=True)]
+        high = [
+            (c + 1) / self.grid.per_unit + start for c, start in zip(cells[2:], self.grid.low, strict=True)
+        ]
         return (low[0], low[1]), (high[0] - low[0], high[1] - low[1])
 
 

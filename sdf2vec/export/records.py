@@ -36,9 +36,18 @@ from ..shapes import KINDS
 
 Floats = NDArray[np.float32]
 
-OPACITY, FALLOFF, COUNT, SMOOTHNESS, JOIN = range(5)  # places in a record; the last three in scenes with joins
-BELOW, FIELD, OTHER = var("c", VEC4), var("s", VEC4), var("o", VEC4)  # of a loop: what is below, a layer, its next shape
-HEAD, OWN = "r0", "q0"  # the first vec4 of a layer's record, and of the record of a shape that is joined to it
+OPACITY, FALLOFF, COUNT, SMOOTHNESS, JOIN = range(
+    5
+)  # places in a record; the last three in scenes with joins
+BELOW, FIELD, OTHER = (
+    var("c", VEC4),
+    var("s", VEC4),
+    var("o", VEC4),
+)  # of a loop: what is below, a layer, its next shape
+HEAD, OWN = (
+    "r0",
+    "q0",
+)  # the first vec4 of a layer's record, and of the record of a shape that is joined to it
 
 
 class Variant(NamedTuple):
@@ -68,7 +77,9 @@ def variants_of(scene: Scene) -> tuple[Variant, ...]:
     """All that a scene has, in the order of KINDS; patches last."""
     found = {variant_of(shape) for layer in scene.layers for shape in layer.shapes}
     places = list(KINDS)
-    return tuple(sorted(found, key=lambda v: (KINDS[v.kind].patch is not None, places.index(v.kind), v.paint)))
+    return tuple(
+        sorted(found, key=lambda v: (KINDS[v.kind].patch is not None, places.index(v.kind), v.paint))
+    )
 
 
 def joins_of(scene: Scene) -> tuple[str, ...]:

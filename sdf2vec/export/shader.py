@@ -336,7 +336,11 @@ def _packed(job: _Job) -> dict[str, Any]:
     packed = packing.pack(job.scene, job.slack)
     text = PackedText(job.scene, packed, job.dialect, job.motion(var("float(i)")))
     part = text.part() | {"coarsest": literal(COARSEST), "moving": bool(job.slack)}
-    return {"functions": job.functions([*text.roots, grid_point(P, P, P)]), "packed": part, "error": packed.error}
+    return {
+        "functions": job.functions([*text.roots, grid_point(P, P, P)]),
+        "packed": part,
+        "error": packed.error,
+    }
 
 
 _BODIES = {"readable": _readable, "table": _table, "tiled": _tiled, "packed": _packed, "data": _data}

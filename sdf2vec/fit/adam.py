@@ -27,7 +27,7 @@ class Moving:
 
     @classmethod
     def of(cls, tensor: torch.Tensor, rate: float) -> Moving:
-        """Without history."""
+        """With its running means at 0, as before the first step."""
         zero = torch.zeros_like(tensor).detach()
         return cls(tensor.detach_().requires_grad_(), rate, zero, zero.clone(), zero.new_zeros(()))
 
@@ -71,7 +71,7 @@ class Adam:
             moving.step(factor)
 
     def replace(self, before: torch.Tensor, after: torch.Tensor, rows: torch.Tensor) -> None:
-        """Puts a tensor in another's place: its first rows are these of the other, the rest has no history."""
+        """Puts a tensor in another's place: its first rows are these of the other; the rest's running means are 0."""
         for moving in self.moving:
             if moving.tensor is before:
                 moving.tensor = after.requires_grad_()

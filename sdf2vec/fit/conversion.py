@@ -31,7 +31,7 @@ def over_of(scene: Scene) -> tuple[Scene, float]:
     channels = 4 if scene.background is None else 3
     pixels = wanted.permute(1, 2, 0).numpy()
     picture = Picture(unpremultiply(pixels) if channels == 4 else np.ascontiguousarray(pixels[..., :3]))
-    kinds = list(dict.fromkeys(layer.kind for layer in scene.layers))
+    kinds = list(dict.fromkeys(layer.shapes[0].kind for layer in scene.layers))
     fitted = fit_picture(picture, settings_of(kind=kinds, start=_painted(scene), device="cpu"))
     found = replace(fitted, width=scene.width, height=scene.height)
     return found, float(psnr(draw(found, width, height)[:channels], wanted[:channels]))
@@ -54,7 +54,7 @@ def _painted(scene: Scene) -> Scene:
 def _laid(layer: Layer, color: list[float]) -> Layer:
     red, green, blue = color
     shapes = tuple(Shape(shape.kind, shape.parameters, (red, green, blue)) for shape in layer.shapes)
-    return Layer(shapes, layer.falloff, OPACITY, layer.smoothness)
+    return Layer(shapes, layer.falloff, OPACITY, layer.joints)
 
 
 def _displayed(color: tuple[float, float, float] | None) -> tuple[float, float, float] | None:

@@ -1,4 +1,4 @@
-"""Which layers leave and which come: those that matter least go, new ones start where most is missing.
+"""Which layers leave and which come: `prune` those that matter least, `densify` where most is missing.
 
 What is decided is pure; `exchange` alone changes a scene, and Adam's state with it.
 """
@@ -10,10 +10,11 @@ from functools import partial
 
 import torch
 
+from ..blend import COMPOSITING
 from ..render.tensors import Group, SceneTensors
 from .adam import Adam
-from .placing import Layers, Places, groups_at, straight
-from .pursuit import find_places
+from .initialization import Layers, Places, groups_at, straight
+from .matching_pursuit import find_discs
 
 PROBES = 8  # random images that estimate what a layer does to the picture
 ROOM = 0.8  # size of a new shape, in radii of the disc whose place it takes: its falloff lies outside of that
@@ -34,7 +35,7 @@ def importance(
     E[(Σ r·change)²] = Σ change² (Hutchinson).
     """
     leaves = [(i, leaf) for i, group in enumerate(tensors.groups) for leaf in _linear_in(group, tensors)]
-    totals = [torch.zeros(len(group.order)) for group in tensors.groups]
+    totals = [torch.zeros(len(group)) for group in tensors.groups]
     for _ in range(PROBES):
         signs = (torch.randint(0, 2, image.shape, generator=generator).float() * 2 - 1).to(image.device)
         if weights is not None:
@@ -48,19 +49,22 @@ def importance(
         )
         changes = [torch.zeros_like(total) for total in totals]
         for (index, leaf), grad in zip(leaves, grads, strict=True):
-            changes[index] += (leaf.detach() * grad)[:, None].flatten(1).sum(1).cpu()
+            changes[index] += (leaf.detach() * grad).sum(1).cpu()
         totals = [total + change.square() for total, change in zip(totals, changes, strict=True)]
     return totals
 
 
 def _linear_in(group: Group, tensors: SceneTensors) -> list[torch.Tensor]:
-    """What an image is linear in, such that a group's layers are left out where it is 0."""
-    if tensors.compositing == "over":
-        return [group.opacity]
-    return [group.colors, group.opacity] if tensors.transparent else [group.colors]
+    """What an image is linear in, such that a group's layers are left out where it is 0; of that what can move."""
+    found = (
+        [group.opacity, *group.colors]
+        if "color" in COMPOSITING[tensors.compositing].linear_in
+        else [group.opacity]
+    )
+    return [tensor for tensor in found if tensor.requires_grad]
 
 
-def least(scores: Sequence[torch.Tensor], count: int) -> list[torch.Tensor]:
+def prune(scores: Sequence[torch.Tensor], count: int) -> list[torch.Tensor]:
     """For each group, the rows that stay when the `count` layers with the lowest scores go."""
     flat = torch.cat(list(scores))
     stays = torch.ones(len(flat), dtype=torch.bool)
@@ -69,7 +73,7 @@ def least(scores: Sequence[torch.Tensor], count: int) -> list[torch.Tensor]:
     return [part.nonzero()[:, 0] for part in parts]
 
 
-def newcomers(
+def densify(
     image: torch.Tensor,
     target: torch.Tensor,
     count: int,
@@ -84,17 +88,24 @@ def newcomers(
     """
     image, target = image.detach().cpu(), target.cpu()
     residual = target - image if weights is None else (target - image) * weights.cpu()
-    found = find_places(residual, count)
+    found = find_discs(residual, count)
     height, width = target.shape[1:]
     centers = (found.centers / torch.tensor([width, height]) - 0.5) * torch.tensor(tensors.size)
     sizes = found.radii * ROOM * (tensors.size[0] / width)
     column, row = found.centers.long().unbind(1)
-    if tensors.compositing == "additive":
+    if layers.signed:
         amounts = torch.nn.functional.pad(found.amounts, (0, 4 - found.amounts.shape[1]))
         colors = amounts.clamp(-1.0, 1.0)
     else:
         colors = straight(image[:, row, column].T + found.amounts)
     return groups_at(Places(centers, sizes, colors), layers, generator, first=tensors.layer_count)
+
+
+def relocate(
+    tensors: SceneTensors, optimizer: Adam, scores: Sequence[torch.Tensor], fresh: Sequence[Group]
+) -> None:
+    """Puts new layers in place of as many with the lowest scores ([G] for each group)."""
+    exchange(tensors, optimizer, prune(scores, sum(len(group) for group in fresh)), fresh)
 
 
 def exchange(
@@ -109,13 +120,14 @@ def exchange(
     """
     for index, rows in enumerate(stays):
         old = tensors.groups[index]
-        new = next((group for group in fresh if _same(group, old)), None)
+        new = next((group for group in fresh if group.structure == old.structure), None)
         kept = old.each(partial(_rows_of, rows))
         joined = kept if new is None else kept.joined(new.each(partial(_beside, old.order)))
         tensors.groups[index] = joined
-        for (_, before), (_, after) in zip(old.tensors(), joined.tensors(), strict=True):
+        for before, after in zip(old.values.values(), joined.values.values(), strict=True):
             optimizer.replace(before, after, rows)
-    tensors.groups += [new for new in fresh if not any(_same(new, old) for old in tensors.groups)]
+    present = {group.structure for group in tensors.groups}
+    tensors.groups += [new for new in fresh if new.structure not in present]
     _renumber(tensors.groups)
 
 
@@ -127,14 +139,10 @@ def _beside(other: torch.Tensor, tensor: torch.Tensor) -> torch.Tensor:
     return tensor.to(other.device)
 
 
-def _same(a: Group, b: Group) -> bool:
-    return (a.kind, a.union_size) == (b.kind, b.union_size)
-
-
 def _renumber(groups: Sequence[Group]) -> None:
     """Draw orders become 0, 1, 2, … without gaps."""
     orders = torch.cat([group.order for group in groups])
     ranks = torch.empty_like(orders)
     ranks[orders.argsort(stable=True)] = torch.arange(len(orders), device=orders.device)
-    for group, order in zip(groups, ranks.split([len(g.order) for g in groups]), strict=True):
+    for group, order in zip(groups, ranks.split([len(g) for g in groups]), strict=True):
         group.order = order

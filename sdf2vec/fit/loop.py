@@ -11,26 +11,32 @@ from functools import partial
 import numpy as np
 import torch
 
+from ..blend import COMPOSITING
+from ..deferred import deferred
 from ..errors import Sdf2vecError
 from ..image import Picture, premultiply, resize, unpremultiply
 from ..render import fused
-from ..render.device import Device, choose
-from ..render.fused import is_compiled, threads_of_its_own
 from ..render.tensors import Group, SceneTensors, from_scene, on_device, to_scene
 from ..scene import Scene
+from ..threads import threads_of_its_own
+from ..units import BACKGROUND, OPACITY, Unit
 from .adam import Adam
-from .constraints import project, too_small, widen
-from .growth import exchange, importance, least, newcomers
+from .backends import Backend, choose
+from .constraints import enforce_min_thickness, project, too_small
+from .growth import densify, exchange, importance, prune, relocate
+from .initialization import Layers, background_of, empty_groups, place
 from .losses import Objective, objective
-from .placing import Layers, background_of, empty_groups, place
-from .presets import CROWDED, CROWDING, LENGTHS, MANY, RATES, Phase, Start
+from .presets import CROWDING, MANY, Phase, Start
 from .settings import Settings, preset_of, weights_for
 
-WIDEN_EVERY = 10  # steps
+THICKEN_EVERY = 10  # steps
 AREA_WEIGHT = 1.0  # of the area constraint in the loss
 TRIAL_LAYERS, TRIAL_STEPS, TRIAL_RATE = 4, 60, 0.5
 REFIT_STEPS = 100  # after the colours have been restricted
 ANYWHERE = Start("uniform")
+restrict_colors: Callable[..., None] = deferred(
+    "sdf2vec.fit.palette", "restrict"
+)  # scipy: most fits don't need it
 SAME_SHAPE = 0.01  # scene units by which a start scene's canvas may differ
 
 
@@ -75,12 +81,12 @@ class Stage:
 
 
 class Fit:
-    """A scene on its way to a picture."""
+    """What a fit works with: settings, the picture's pixels, the scene as it is now, the optimiser."""
 
     def __init__(self, picture: Picture, settings: Settings, callback: Callback) -> None:
         self.settings, self.callback = settings, callback
         self.preset = preset_of(settings)
-        self.device: Device = choose(settings.device)
+        self.backend: Backend = choose(settings.device)
         self.generator = torch.Generator().manual_seed(settings.seed)
         self.pixels = premultiply(picture.pixels) if picture.has_alpha else picture.pixels
         self.pixel = 1.0 / min(picture.width, picture.height)
@@ -88,7 +94,7 @@ class Fit:
         self.done, self.steps, self.stopped = 0, self._count_steps(), False
         self.tensors = self._start()
         self._announce_compiling()
-        self.tensors = on_device(self.tensors, self.device.name)
+        self.tensors = on_device(self.tensors, self.backend.device)
         self.optimizer = self._adam()
 
     @property
@@ -107,7 +113,7 @@ class Fit:
             if not self.stopped:
                 with suppress(Stopped):
                     self._refit(stage)
-        widen(self.tensors, self.pixel)
+        enforce_min_thickness(self.tensors, self.pixel)
 
     def _train_all(self) -> None:
         """All phases and trials."""
@@ -140,47 +146,49 @@ class Fit:
         tensors = replace(from_scene(settings.start), size=self.size)
         if tensors.transparent != (len(target) == 4):
             tensors.background = background_of(target)
-        present = {(group.kind, group.union_size) for group in tensors.groups}
-        tensors.groups += [g for g in empty_groups(layers) if (g.kind, g.union_size) not in present]
+        present = {group.structure for group in tensors.groups}
+        tensors.groups += [group for group in empty_groups(layers) if group.structure not in present]
         self._resize(tensors, target)
         return tensors
 
     def _resize(self, tensors: SceneTensors, target: torch.Tensor) -> None:
         """Brings a start scene to the number of shapes asked for, or just below it where unions leave a rest."""
         optimizer = adam(tensors)
-        spare = _shape_count(tensors) - self.settings.shapes
+        spare = tensors.shape_count - self.settings.shapes
         if spare > 0:
             image = fused.composite(tensors, target.shape[2], target.shape[1], len(target))
             scores = importance(image, tensors, self.generator)
-            sizes = torch.cat([torch.full((len(group.order),), group.union_size) for group in tensors.groups])
+            sizes = torch.cat([torch.full((len(group),), len(group.structure)) for group in tensors.groups])
             taken = sizes[torch.cat(scores).argsort(stable=True)].cumsum(0)
-            exchange(tensors, optimizer, least(scores, int((taken < spare).sum()) + 1), ())
-        count = (self.settings.shapes - _shape_count(tensors)) // self.settings.union
+            exchange(tensors, optimizer, prune(scores, int((taken < spare).sum()) + 1), ())
+        count = (self.settings.shapes - tensors.shape_count) // self.settings.union
         if count > 0:
             image = fused.composite(tensors, target.shape[2], target.shape[1], len(target))
-            everything = [torch.arange(len(group.order)) for group in tensors.groups]
-            fresh = newcomers(image, target, count, tensors, _layers_of(self.settings), self.generator)
+            everything = [torch.arange(len(group)) for group in tensors.groups]
+            fresh = densify(image, target, count, tensors, _layers_of(self.settings), self.generator)
             exchange(tensors, optimizer, everything, fresh)
 
     def _announce_compiling(self) -> None:
-        if self.device.name == "cpu" and not is_compiled(self.tensors, self.pixels.shape[2]):
+        if not self.backend.is_compiled(self.tensors, self.pixels.shape[2]):
             self.callback(Progress("compiling kernels (once)", 0, self.steps, math.nan))
 
     def _stage(self, phase: Phase) -> Stage:
         resolution = self._resolution(phase)
-        target = scaled(self.pixels, resolution).to(self.device.name)
+        target = scaled(self.pixels, resolution).to(self.backend.device)
         weights = None
         if self.settings.weights is not None:
             height, width = target.shape[1:]
-            weights = torch.from_numpy(weights_for(self.settings.weights, width, height)).to(self.device.name)
-        return Stage(phase, target, weights, objective(phase.loss, target, weights))
+            weights = torch.from_numpy(weights_for(self.settings.weights, width, height)).to(
+                self.backend.device
+            )
+        return Stage(phase, target, weights, objective(phase.loss, target, weights, self.backend.losses))
 
     def _resolution(self, phase: Phase) -> float:
         return self.preset.resolution(phase, self.settings.shapes)
 
     def _draw(self, tensors: SceneTensors, target: torch.Tensor) -> torch.Tensor:
         channels, height, width = target.shape
-        return self.device.composite(tensors, width, height, channels)
+        return self.backend.composite(tensors, width, height, channels)
 
     def _train(self, stage: Stage, moves: Callable[[Group], torch.Tensor] | None = None) -> None:
         """The steps of a phase; `moves` tells which layers of a group are trained, all without it."""
@@ -190,7 +198,7 @@ class Fit:
                 self._relocate(stage, phase.relocation.share)
             loss = self._step(stage, rate, moves)
             self.done += 1
-            if self.callback(Progress(phase.name, self.done, self.steps, loss, self.device.name)):
+            if self.callback(Progress(phase.name, self.done, self.steps, loss, self.backend.device)):
                 self.stopped = True
                 raise Stopped
 
@@ -205,8 +213,8 @@ class Fit:
             _freeze(self.tensors, moves)
         self.optimizer.step(rate)
         project(self.tensors, self.pixel, self.preset.falloff)
-        if self.done % WIDEN_EVERY == 0:
-            widen(self.tensors, self.pixel)
+        if self.done % THICKEN_EVERY == 0:
+            enforce_min_thickness(self.tensors, self.pixel)
         return float(value.detach())
 
     def _try(self, stage: Stage) -> None:
@@ -223,7 +231,7 @@ class Fit:
         )
         for group in places.groups:
             group.order += self.tensors.layer_count
-        exchange(self.tensors, self.optimizer, least(scores, count), places.groups)
+        relocate(self.tensors, self.optimizer, scores, places.groups)
         first = self.tensors.layer_count - count
         phase = Phase("trial", TRIAL_STEPS, stage.phase.resolution, rate=TRIAL_RATE, end_rate=0.05)
         self.optimizer = self._adam()
@@ -238,11 +246,8 @@ class Fit:
 
     def _restrict_colors(self, stage: Stage) -> None:
         """To the palette given or, of so many colours, the best."""
-        from .palette import found, snap  # loads scipy, which most fits don't need
-
         cover = importance(self._draw(self.tensors, stage.target), self.tensors, self.generator)
-        palette = self.settings.palette or found(self.tensors, cover, self.settings.colors, self.generator)
-        snap(self.tensors, list(palette))
+        restrict_colors(self.tensors, cover, self.settings.palette, self.settings.colors, self.generator)
 
     def _refit(self, stage: Stage) -> None:
         """Trains all but the colours."""
@@ -257,29 +262,25 @@ class Fit:
         image = self._draw(self.tensors, stage.target)
         scores = self._scores(image, stage)
         layers = _layers_of(self.settings)
-        fresh = newcomers(image, stage.target, count, self.tensors, layers, self.generator, stage.weights)
-        exchange(self.tensors, self.optimizer, least(scores, count), fresh)
+        fresh = densify(image, stage.target, count, self.tensors, layers, self.generator, stage.weights)
+        relocate(self.tensors, self.optimizer, scores, fresh)
 
     @property
     def _replaceable(self) -> int:
         """How many layers are of as many shapes as new ones, so that the number of shapes stays."""
-        return sum(len(g.order) for g in self.tensors.groups if g.union_size == self.settings.union)
+        return sum(len(g) for g in self.tensors.groups if len(g.structure) == self.settings.union)
 
     def _scores(self, image: torch.Tensor, stage: Stage) -> list[torch.Tensor]:
         """The importance of each group's layers; infinite where they can't be replaced."""
         scores = importance(image, self.tensors, self.generator, stage.weights)
         return [
-            score if group.union_size == self.settings.union else torch.full_like(score, math.inf)
+            score if len(group.structure) == self.settings.union else torch.full_like(score, math.inf)
             for score, group in zip(scores, self.tensors.groups, strict=True)
         ]
 
 
 def _layers_of(settings: Settings) -> Layers:
-    return Layers(settings.kinds, settings.compositing, settings.union)
-
-
-def _shape_count(tensors: SceneTensors) -> int:
-    return sum(len(group.order) * group.union_size for group in tensors.groups)
+    return Layers(settings.kinds, settings.compositing, settings.union, settings.paint)
 
 
 def _check_start(scene: Scene, size: tuple[float, float]) -> None:
@@ -299,7 +300,7 @@ def _freeze(tensors: SceneTensors, moves: Callable[[Group], torch.Tensor]) -> No
     """Leaves the layers that may not move, and the background, without a derivative."""
     for group in tensors.groups:
         still = ~moves(group)
-        for _, tensor in group.tensors():
+        for tensor in group.values.values():
             if tensor.grad is not None:
                 tensor.grad[still] = 0.0
     if tensors.background.grad is not None:
@@ -307,24 +308,21 @@ def _freeze(tensors: SceneTensors, moves: Callable[[Group], torch.Tensor]) -> No
 
 
 def adam(tensors: SceneTensors, crowding: float = CROWDING, frozen: tuple[str, ...] = ()) -> Adam:
-    """Adam over all that may move, each tensor at the rate of what it means; `frozen`: names in `RATES`."""
-    free = [pair for group in tensors.groups for pair in group.tensors()]
+    """Adam over all that may move, each tensor at the rate of its unit; `frozen`: names of units that may not."""
+    free = [(slot.parameter.unit, v) for group in tensors.groups for slot, v in group.values.items()]
     if not tensors.transparent:
-        free.append(("background", tensors.background))
-        if tensors.compositing == "additive":
-            frozen = (*frozen, "opacity")
-    rates = _rates_for(tensors, crowding)
-    return Adam((tensor, rates[name]) for name, tensor in free if name not in frozen)
-
-
-def _rates_for(tensors: SceneTensors, crowding: float) -> dict[str, float]:
-    """`RATES` for a canvas of this size with so many layers."""
-    canvas = math.sqrt(tensors.size[0] * tensors.size[1])
+        free.append((BACKGROUND, tensors.background))
+        if not COMPOSITING[tensors.compositing].hides:  # what is added to alpha is never seen
+            frozen = (*frozen, OPACITY.name)
     few = MANY / max(1, tensors.layer_count)
     crowd = few ** (crowding if few < 1 else CROWDING)
-    rates = RATES | {name: RATES[name] * crowd for name in CROWDED}
-    rates |= {name: rates[name] * canvas for name in LENGTHS}
-    return rates | {"frequency": rates["frequency"] / canvas}
+    canvas = math.sqrt(tensors.size[0] * tensors.size[1])
+    return Adam((tensor, rate_of(unit, canvas, crowd)) for unit, tensor in free if unit.name not in frozen)
+
+
+def rate_of(unit: Unit, canvas: float, crowd: float) -> float:
+    """Adam's rate for a canvas of this size, the square root of its area; `crowd` is the factor for many layers."""
+    return unit.rate * (crowd if unit.crowded else 1.0) * canvas**unit.scaling
 
 
 def _rates(phase: Phase) -> Iterator[float]:

@@ -2,22 +2,36 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 import torch
-from numpy.typing import NDArray
 from scipy.cluster.vq import kmeans2
 from skimage.color import lab2rgb, rgb2lab
 
+from ..arrays import Float64Array
 from ..render.tensors import SceneTensors
+from ..scene import Color
 
 SAMPLES = 4096  # colours drawn in proportion to what they cover
 ROUNDS = 50  # of k-means
 DECIMALS = 3  # of a found colour: 8 bits hold no more
 
 
+def restrict(
+    tensors: SceneTensors,
+    cover: list[torch.Tensor],
+    palette: Sequence[Color],
+    count: int,
+    generator: torch.Generator,
+) -> None:
+    """Replaces every colour by the nearest of a palette, in place; without one, of the best `count` (see `found`)."""
+    snap(tensors, palette or found(tensors, cover, count, generator))
+
+
 def found(
     tensors: SceneTensors, cover: list[torch.Tensor], count: int, generator: torch.Generator
-) -> list[tuple[float, float, float]]:
+) -> list[Color]:
     """At most `count` colours that stand for the scene's best: k-means, each weighted by what it covers ([G])."""
     colors, weights = _colors(tensors), _weights(tensors, cover)
     picked = torch.multinomial(weights, SAMPLES, replacement=True, generator=generator)
@@ -30,12 +44,12 @@ def found(
 
 
 @torch.no_grad()
-def snap(tensors: SceneTensors, palette: list[tuple[float, float, float]]) -> None:
+def snap(tensors: SceneTensors, palette: Sequence[Color]) -> None:
     """Replaces every colour, the background's too, by the nearest of the palette, in place."""
     choices = torch.tensor(palette)
     for group in tensors.groups:
-        flat = group.colors.reshape(-1, 3)
-        group.colors.copy_(_nearest(flat.cpu(), choices).to(flat.device).reshape(group.colors.shape))
+        for colors in group.colors:
+            colors.copy_(_nearest(colors.cpu(), choices).to(colors.device))
     if not tensors.transparent:
         tensors.background[:3] = _nearest(tensors.background[None, :3].cpu(), choices)[0]
 
@@ -49,20 +63,18 @@ def _nearest(colors: torch.Tensor, choices: torch.Tensor) -> torch.Tensor:
 
 def _colors(tensors: SceneTensors) -> torch.Tensor:
     """All colours of a scene, [M, 3]; the background's last, unless it is transparent."""
-    colors = [group.colors.detach().cpu().reshape(-1, 3) for group in tensors.groups]
+    colors = [own.detach().cpu() for group in tensors.groups for own in group.colors]
     ground = [] if tensors.transparent else [tensors.background.detach()[None, :3].cpu()]
     return torch.cat([*colors, *ground]).clamp(0.0, 1.0)
 
 
 def _weights(tensors: SceneTensors, cover: list[torch.Tensor]) -> torch.Tensor:
     """A weight for each of `_colors`; the background counts as the mean of the layers together."""
-    parts = [
-        score.repeat_interleave(group.union_size) for score, group in zip(cover, tensors.groups, strict=True)
-    ]
+    parts = [score for score, group in zip(cover, tensors.groups, strict=True) for _ in group.colors]
     weights = torch.cat(parts) + 1e-9
     return weights if tensors.transparent else torch.cat([weights, weights.mean()[None] * len(weights) * 0.1])
 
 
-def _lab(colors: torch.Tensor) -> NDArray[np.float64]:
-    lab: NDArray[np.float64] = rgb2lab(colors.double().numpy()[None])[0]
+def _lab(colors: torch.Tensor) -> Float64Array:
+    lab: Float64Array = rgb2lab(colors.double().numpy()[None])[0]
     return lab

@@ -136,18 +136,3 @@ PRESETS: dict[str, Preset] = {
     ),
 }
 DEFAULT = "balanced"
-
-# Learning rates per step on a canvas of area 1, by what a tensor means (units as in `shapes.Parameter`).
-RATES = {
-    "position": 0.01,
-    "length": 0.003,
-    "angle": 0.03,
-    "frequency": 0.3,
-    "color": 0.014,
-    "opacity": 0.01,
-    "falloff": 0.01,
-    "smoothness": 0.003,
-    "background": 0.01,
-}
-LENGTHS = ("position", "length", "falloff", "smoothness")  # grow with the canvas
-CROWDED = (*LENGTHS, "color", "opacity")  # fall with the number of layers: smaller ones take smaller steps

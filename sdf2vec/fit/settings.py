@@ -16,7 +16,8 @@ from ..blend import COMPOSITING
 from ..errors import Sdf2vecError
 from ..image import load as load_picture
 from ..image import resize
-from ..scene import MAX_SHAPES, MAX_UNION, Color, Scene
+from ..paints import FLAT
+from ..scene import MAX_JOINED, MAX_SHAPES, Color, Scene
 from ..scene import load as load_scene
 from ..shapes import KINDS
 from .presets import DEFAULT, PRESETS, SOFTEST, Loss, Preset
@@ -56,6 +57,7 @@ class Settings:
     palette: tuple[Color, ...] = ()
     colors: int = 0
     weights: NDArray[np.float32] | None = field(default=None, compare=False)
+    paint: str = FLAT
 
 
 def preset_of(settings: Settings) -> Preset:
@@ -96,7 +98,7 @@ def settings_of(
     check_choice("preset", preset, tuple(PRESETS))
     check_choice("device", device, DEVICES)
     _check_whole("seed", seed, 0, 2**63 - 1)
-    _check_whole("number of shapes joined (union)", union, 1, MAX_UNION)
+    _check_whole("number of shapes joined (union)", union, 1, MAX_JOINED)
     _check_whole("number of trials", trials, 0, 10_000)
     scene = _scene_of(start)
     shapes = _count_of(shapes, scene)

@@ -2,41 +2,37 @@
 
 from __future__ import annotations
 
-from pathlib import Path
-
 import numpy as np
 import torch
 
+from ..arrays import Float32Array
 from ..metrics import gaussian_window
-from ..render import compiled
-from ..render.fused import in_threads_each
-from .written import Floats, WrittenLoss
+from ..threads import in_threads_each
+from .analytic_loss import AnalyticLoss
+from .ssim_kernels import local_means, similarity
 
 
-class Dissimilarity(WrittenLoss):
+class Dissimilarity(AnalyticLoss):
     """1 − SSIM against a fixed target, [C, H, W]; its local means are computed once."""
 
     def __init__(self, target: torch.Tensor) -> None:
-        self.kernels = compiled.load(Path(__file__).with_name("ssim_kernels.py").read_text())
-        self.target: Floats = np.ascontiguousarray(target.numpy(), dtype=np.float32)
+        self.target: Float32Array = np.ascontiguousarray(target.numpy(), dtype=np.float32)
         height, width = self.target.shape[1:]
         self.across, self.down = (
             gaussian_window(side).numpy().astype(np.float32) for side in (width, height)
         )
-        self.mean = np.stack(
-            [self.kernels.local_means(channel, self.across, self.down) for channel in self.target]
-        )
+        self.mean = np.stack([local_means(channel, self.across, self.down) for channel in self.target])
         self.square = np.stack(
-            [self.kernels.local_means(channel * channel, self.across, self.down) for channel in self.target]
+            [local_means(channel * channel, self.across, self.down) for channel in self.target]
         )
 
-    def value_and_gradient(self, render: Floats) -> tuple[float, Floats]:
+    def value_and_gradient(self, render: Float32Array) -> tuple[float, Float32Array]:
         """1 − SSIM and its derivative by the render."""
         grad = np.empty_like(render)
 
         def channel(c: int) -> float:
             return float(
-                self.kernels.similarity(
+                similarity(
                     render[c], self.target[c], self.mean[c], self.square[c], self.across, self.down, grad[c]
                 )
             )

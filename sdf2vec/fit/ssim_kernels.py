@@ -1,20 +1,17 @@
-"""Structural similarity with its derivative, in loops that vectorise; compiled by `fit.ssim`.
+"""Structural similarity with its derivative, in loops that vectorise.
 
 Rows are long and contiguous: every pass adds shifted rows, weighted by the window.
 """
 
 import numpy as np
-from numba import njit
 
-f32 = np.float32
-SAME = {"fastmath": {"reassoc", "nsz", "arcp", "contract", "afn"}, "error_model": "numpy", "nogil": True}
-# inlined, and only what is called from outside is kept on disk: see `lower.numba`
-OPTIONS, ENTRY = {**SAME, "forceinline": True}, {**SAME, "cache": CACHE}  # noqa: F821 (filled in when compiled)
+from ..kernel_cache import inlined, kernel
+from ..lower.numba_math import TWO, f32
+
 C1, C2 = f32(0.01**2), f32(0.03**2)
-TWO = f32(2)
 
 
-@njit(**OPTIONS)
+@inlined
 def smooth(source, across, down, rows, out):
     """out = source filtered by both windows, where they fit; `rows` is scratch."""
     for y in range(source.shape[0]):
@@ -29,7 +26,7 @@ def smooth(source, across, down, rows, out):
                 out[y, x] += down[k] * rows[y + k, x]
 
 
-@njit(**OPTIONS)
+@inlined
 def spread(source, across, down, rows, out):
     """The transpose of `smooth`: out = what every pixel gave to source."""
     rows[:] = f32(0)
@@ -44,7 +41,7 @@ def spread(source, across, down, rows, out):
                 out[y, x + k] += across[k] * rows[y, x]
 
 
-@njit(**ENTRY)
+@kernel
 def local_means(source, across, down):
     """The means of one channel over all places of the window."""
     rows = np.empty((source.shape[0], source.shape[1] - across.size + 1), f32)
@@ -53,7 +50,7 @@ def local_means(source, across, down):
     return out
 
 
-@njit(**ENTRY)
+@kernel
 def similarity(a, b, mean_b, square_b, across, down, grad):
     """Σ SSIM of one channel over all places of the window; `grad` becomes its derivative by a."""
     height, width = a.shape

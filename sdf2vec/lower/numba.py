@@ -20,64 +20,10 @@ PREAMBLE = '''\
 from math import ceil, floor
 
 import numpy as np
-from numba import njit
-from numpy import log, sqrt
+from numpy import sqrt
 
-f32 = np.float32
-ZERO, ONE, QUARTER, LEAST = f32(0), f32(1), f32(1.5707963267948966), f32(1e-30)
-SAME = {"fastmath": {"reassoc", "nsz", "arcp", "contract", "afn"}, "error_model": "numpy", "nogil": True}
-# Everything is inlined into what is called from outside, and only that is kept on disk: else a fresh compilation
-# and one from disk could link different copies of a function, which differ in the last digits.
-OPTIONS, ENTRY = {**SAME, "forceinline": True}, {**SAME, "cache": CACHE}
-_T = [f32(v) for v in (
-    4.89352455891786e-03, 6.37261928875436e-04, 1.48572235717979e-05, 5.12229709037114e-08,
-    -8.60467152213735e-11, 2.00018790482477e-13, -2.76076847742355e-16,
-    4.89352518554385e-03, 2.26843463243900e-03, 1.18534705686654e-04, 1.19825839466702e-06,
-)]
-T0, T1, T2, T3, T4, T5, T6, B0, B1, B2, B3 = _T
-HALF, SPAN = f32(0.5), f32(7.90531110763549805)
-TURN, TURN_HIGH, TURN_LOW = f32(0.15915494309189535), f32(6.28125), f32(0.0019353071795864769)
-PI = f32(3.141592653589793)
-S3, S5, S7, S9, S11 = f32(-1 / 6), f32(1 / 120), f32(-1 / 5040), f32(1 / 362880), f32(-1 / 39916800)
-E2, E3, E4, E5, E6 = f32(1 / 2), f32(1 / 6), f32(1 / 24), f32(1 / 120), f32(1 / 720)
-SCALE, LOWEST = f32(1 / 256), f32(-87)
-
-
-@njit(**OPTIONS)
-def fast_sigmoid(x):
-    """A rational tanh of degrees 13 and 6, accurate to a few units in the last place."""
-    t = HALF * x
-    t = SPAN if t > SPAN else t
-    t = -SPAN if t < -SPAN else t
-    q = t * t
-    p = t * (T0 + q * (T1 + q * (T2 + q * (T3 + q * (T4 + q * (T5 + q * T6))))))
-    return HALF + HALF * p / (B0 + q * (B1 + q * (B2 + q * B3)))
-
-
-@njit(**OPTIONS)
-def fast_sin(x):
-    """Sine by reduction to half a turn and a polynomial of degree 11."""
-    k = np.floor(x * TURN + HALF)
-    r = (x - k * TURN_HIGH) - k * TURN_LOW
-    r = PI - r if r > QUARTER else r
-    r = -PI - r if r < -QUARTER else r
-    q = r * r
-    return r * (ONE + q * (S3 + q * (S5 + q * (S7 + q * (S9 + q * S11)))))
-
-
-@njit(**OPTIONS)
-def fast_exp(x):
-    """Exponential by a polynomial and eight squarings."""
-    r = (x if x > LOWEST else LOWEST) * SCALE
-    y = ONE + r * (ONE + r * (E2 + r * (E3 + r * (E4 + r * (E5 + r * E6)))))
-    y *= y
-    y *= y
-    y *= y
-    y *= y
-    y *= y
-    y *= y
-    y *= y
-    return y * y
+from sdf2vec.kernel_cache import inlined, kernel
+from sdf2vec.lower.numba_math import ONE, QUARTER, ZERO, f32, fast_exp, fast_log, fast_sigmoid, fast_sin
 '''
 
 
@@ -128,7 +74,7 @@ def scalar(name: str, outputs: Sequence[Expr], inputs: Sequence[Expr], uniforms:
         writer.names[variable] = str(variable.payload)
     lines = writer.lines(walk(outputs), "    ")
     results = ", ".join(writer.spelled(output) for output in outputs)
-    head = f"@njit(**OPTIONS)\ndef {name}({', '.join(['u', *(str(v.payload) for v in inputs)])}):\n"
+    head = f"@inlined\ndef {name}({', '.join(['u', *(str(v.payload) for v in inputs)])}):\n"
     return head + "\n".join([*writer.loads(), *lines, f"    return {results}"]) + "\n"
 
 
@@ -199,5 +145,5 @@ class _Writer:
         zeros: Sequence[str] = (),
         after: Sequence[str] = (),
     ) -> str:
-        head = f"@njit(**OPTIONS)\ndef {name}(u, first, last, {', '.join(arguments)}):\n"
+        head = f"@inlined\ndef {name}(u, first, last, {', '.join(arguments)}):\n"
         return head + "\n".join([*self.loads(), *self.before, *zeros, *inside, *after]) + "\n"

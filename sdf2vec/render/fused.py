@@ -7,14 +7,9 @@ number of threads.
 
 from __future__ import annotations
 
-import os
-from collections.abc import Callable, Iterable, Iterator
-from concurrent.futures import ThreadPoolExecutor
-from contextlib import contextmanager
 from dataclasses import dataclass
-from functools import cache
 from types import ModuleType
-from typing import Any, TypeVar
+from typing import Any
 
 import numpy as np
 import torch
@@ -23,14 +18,13 @@ from torch.autograd.function import once_differentiable
 
 from ..blend import COMPOSITING
 from ..layer import Structure
+from ..threads import in_threads
 from . import kernels
 from .kernels import TILE
 from .reference import canvas_axes
 from .tensors import Group, SceneTensors
 
 Floats = NDArray[np.float32]
-T = TypeVar("T")
-R = TypeVar("R")
 
 
 def composite(tensors: SceneTensors, width: int, height: int, channels: int = 4) -> torch.Tensor:
@@ -71,17 +65,6 @@ def structures_of(tensors: SceneTensors) -> tuple[Structure, ...]:
 def is_compiled(tensors: SceneTensors, channels: int) -> bool:
     """Whether the kernels for this scene are there; if not, the first render takes some seconds."""
     return not tensors.groups or kernels.is_compiled(structures_of(tensors), tensors.compositing, channels)
-
-
-@contextmanager
-def threads_of_its_own() -> Iterator[None]:
-    """Torch on one thread meanwhile: its waiting threads would spin on the cores that the kernels need."""
-    before = torch.get_num_threads()
-    torch.set_num_threads(1)
-    try:
-        yield
-    finally:
-        torch.set_num_threads(before)
 
 
 def bins_of(tensors: SceneTensors, width: int, height: int) -> Bins:
@@ -165,7 +148,7 @@ class _Composite(torch.autograd.Function):
         image = np.empty((canvas.channels, canvas.height, canvas.width), np.float32)
         place = (canvas.hides, canvas.x, canvas.y, canvas.columns)
         shared = (bins.starts, bins.layers, bins.spans, canvas.kinds, numbers, _array(background), *place)
-        _in_threads(canvas.module.forward_tiles, *shared, image)
+        in_threads(canvas.module.forward_tiles, *shared, image)
         ctx.canvas, ctx.bins, ctx.shared = canvas, bins, shared
         return torch.from_numpy(image)
 
@@ -176,7 +159,7 @@ class _Composite(torch.autograd.Function):
         width, longest = ctx.shared[4].shape[1], int(np.diff(bins.starts).max(initial=0))
         grads = np.zeros((len(bins.layers), width), np.float32)
         ground = np.zeros((len(bins.starts) - 1, 4), np.float32)
-        _in_threads(canvas.module.backward_tiles, *ctx.shared, _array(cotangent), longest, grads, ground)
+        in_threads(canvas.module.backward_tiles, *ctx.shared, _array(cotangent), longest, grads, ground)
         totals = np.zeros((len(canvas.kinds), width), np.float64)
         canvas.module.reduce_pairs(bins.layers, grads, totals)
         background = ground.sum(axis=0, dtype=np.float64)
@@ -185,35 +168,3 @@ class _Composite(torch.autograd.Function):
 
 def _array(tensor: torch.Tensor) -> Floats:
     return np.ascontiguousarray(tensor.detach().numpy(), dtype=np.float32)
-
-
-def _in_threads(function: Any, *arguments: Any) -> None:
-    """Runs a kernel over all tiles, every thread taking each n-th."""
-    count = threads()
-    if count == 1:
-        function(0, 1, *arguments)
-        return
-    for future in [_pool().submit(function, first, count, *arguments) for first in range(count)]:
-        future.result()
-
-
-def in_threads_each(function: Callable[[T], R], items: Iterable[T]) -> list[R]:
-    """The function's results for all items, computed in the same threads that render."""
-    return list(map(function, items) if threads() == 1 else _pool().map(function, items))
-
-
-def threads() -> int:
-    """How many threads render: `$SDF2VEC_THREADS`, or one for each core that this process may use."""
-    asked = os.environ.get("SDF2VEC_THREADS", "")
-    return max(1, int(asked)) if asked.isdigit() else available_cores()
-
-
-@cache
-def available_cores() -> int:
-    """Cores that this process may use."""
-    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
-
-
-@cache
-def _pool() -> ThreadPoolExecutor:
-    return ThreadPoolExecutor(max(available_cores(), threads()), thread_name_prefix="sdf2vec")

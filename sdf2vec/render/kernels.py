@@ -10,11 +10,11 @@ from dataclasses import replace
 from functools import cache
 from types import ModuleType
 
+from .. import kernel_cache
 from ..expr import VEC4, Expr, components_of, scalarize, var, walk
 from ..layer import Formula, P, Structure
 from ..lower.numba import PREAMBLE, Block, backward, forward, scalar
 from ..templating import template
-from . import compiled
 
 TILE = 16  # pixels along a side of a tile, the block that kernels work on
 PIXELS = TILE * TILE
@@ -90,9 +90,9 @@ def _both_ways(block: Block, channels: int) -> tuple[str, str]:
 @cache
 def load(structures: tuple[Structure, ...], compositing: str, channels: int) -> ModuleType:
     """The compiled module for layers of these structures and 3 or 4 channels of colour."""
-    return compiled.load(text(structures, compositing, channels))
+    return kernel_cache.load(text(structures, compositing, channels))
 
 
 def is_compiled(structures: tuple[Structure, ...], compositing: str, channels: int) -> bool:
     """Whether these kernels have been compiled before on this machine."""
-    return compiled.is_compiled(text(structures, compositing, channels), "backward_tiles")
+    return kernel_cache.is_compiled(load(structures, compositing, channels).backward_tiles)

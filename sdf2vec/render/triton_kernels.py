@@ -8,12 +8,12 @@ from __future__ import annotations
 from functools import cache
 from types import ModuleType
 
+from .. import kernel_cache
 from ..expr import components_of, scalarize
 from ..layer import Formula, P, Structure
 from ..lower.block import Block
 from ..lower.triton import PREAMBLE, backward, forward
 from ..templating import template
-from . import compiled
 from .kernels import PIXELS, TILE, carried, drawn, solid_blocks
 
 MEASURED = 64  # tiles whose distance from a layer is looked at at once
@@ -58,4 +58,4 @@ def _both_ways(block: Block, channels: int) -> tuple[str, str]:
 @cache
 def load(structures: tuple[Structure, ...], compositing: str, channels: int) -> ModuleType:
     """The module for layers of these structures; Triton compiles its kernels when they are first launched."""
-    return compiled.load_file(text(structures, compositing, channels))
+    return kernel_cache.load_file(text(structures, compositing, channels))

@@ -97,7 +97,7 @@ def _evaluate(layer: Layer, grid: Grid, pixel: float, count: int) -> Array:
     """The first `count` of distance, coverage, red, green, blue: [count, Y, X]."""
     import torch
 
-    from ...render.fused import threads_of_its_own
+    from ...threads import threads_of_its_own
 
     numbers = [pixel, layer.falloff, layer.smoothness]
     for shape in layer.shapes:

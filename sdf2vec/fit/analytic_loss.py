@@ -1,4 +1,4 @@
-"""Losses whose derivative is written out, as functions that torch can differentiate once."""
+"""Losses that compute their own derivative, as functions that torch can differentiate once."""
 
 from __future__ import annotations
 
@@ -7,17 +7,16 @@ from typing import Any
 
 import numpy as np
 import torch
-from numpy.typing import NDArray
 from torch.autograd.function import once_differentiable
 
-Floats = NDArray[np.float32]
+from ..arrays import Float32Array
 
 
-class WrittenLoss(ABC):
+class AnalyticLoss(ABC):
     """A loss of a render [C, H, W] that computes its own derivative, on the CPU."""
 
     @abstractmethod
-    def value_and_gradient(self, render: Floats) -> tuple[float, Floats]:
+    def value_and_gradient(self, render: Float32Array) -> tuple[float, Float32Array]:
         """The loss and its derivative by the render."""
 
     def __call__(self, render: torch.Tensor) -> torch.Tensor:
@@ -27,7 +26,7 @@ class WrittenLoss(ABC):
 
 class _Function(torch.autograd.Function):
     @staticmethod
-    def forward(ctx: Any, loss: WrittenLoss, render: torch.Tensor) -> torch.Tensor:
+    def forward(ctx: Any, loss: AnalyticLoss, render: torch.Tensor) -> torch.Tensor:
         pixels = np.ascontiguousarray(render.detach().numpy(), dtype=np.float32)
         value, ctx.gradient = loss.value_and_gradient(pixels)
         return torch.tensor(value, dtype=torch.float32)

@@ -3,30 +3,47 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
 from dataclasses import dataclass
 
 import torch
 
+from ..blend import COMPOSITING, UNION
+from ..layer import Part, Structure, slots
+from ..paints import FLAT
 from ..render.tensors import Group, SceneTensors
-from ..shapes import KINDS, Parameter
+from ..units import COLOR, FALLOFF, OPACITY, SMOOTHNESS, Placed
 from .presets import Start
 
 UNIFORM_SHARE = 0.35  # of the shapes goes anywhere, the rest where the picture changes
 CANDIDATES = 8  # positions tried for each shape; the one farthest from the others, in their sizes, is taken
-FALLOFF = 0.4  # of a shape's size
-LARGEST = 0.35  # size of a shape, for a canvas of area 1
-OPACITY = 0.8  # under `over`, of an opaque picture
-SMOOTHNESS = 0.25  # of a smooth union, of the size of its layer
+START_FALLOFF = 0.4  # of a shape's size
+LARGEST_SIZE = 0.35  # size of a shape, for a canvas of area 1
+START_OPACITY = 0.8  # of an opaque picture, where colours are not signed
+START_SMOOTHNESS = 0.25  # of a smooth union, of the size of its layer
 
 
 @dataclass(frozen=True)
 class Layers:
-    """What new layers are made of: any of these kinds, so many shapes joined in each, under this compositing."""
+    """What new layers are made of: any of these kinds in this paint, so many joined in each, under this compositing."""
 
     kinds: tuple[str, ...]
     compositing: str
     union: int = 1
+    paint: str = FLAT
+
+    @property
+    def structures(self) -> list[Structure]:
+        """One for each kind."""
+        more = self.union - 1
+        return [
+            (Part(kind, self.paint), *(Part(kind, self.paint, UNION) for _ in range(more)))
+            for kind in self.kinds
+        ]
+
+    @property
+    def signed(self) -> bool:
+        """Whether colours are."""
+        return COMPOSITING[self.compositing].signed
 
 
 @dataclass(frozen=True)
@@ -66,7 +83,7 @@ def place(
     centers, sizes = centers[order], sizes[order]
     background = background_of(target)
     colors = colors_at(target, centers, size)
-    if layers.compositing == "additive":
+    if layers.signed:
         colors[:, :3] = 0.3 * (colors[:, :3] - background[:3]) if start.colors == "picture" else 0.0
     groups = groups_at(Places(centers, sizes, colors), layers, generator)
     if start.falloff is not None:
@@ -82,8 +99,8 @@ def groups_at(places: Places, layers: Layers, generator: torch.Generator, first:
     """
     dealt = torch.randint(len(layers.kinds), (len(places),), generator=generator)
     return [
-        _group(kind, first + rows, places.rows(rows), layers, generator)
-        for index, kind in enumerate(layers.kinds)
+        _group(structure, first + rows, places.rows(rows), layers, generator)
+        for index, structure in enumerate(layers.structures)
         for rows in [(dealt == index).nonzero()[:, 0]]
     ]
 
@@ -118,7 +135,7 @@ def _spread(
     room = (
         (area / (density.flatten()[picked] * count * math.pi))
         .sqrt()
-        .clamp(max=LARGEST * math.sqrt(size[0] * size[1]))
+        .clamp(max=LARGEST_SIZE * math.sqrt(size[0] * size[1]))
     )
     points = torch.stack([x, y], dim=1).reshape(count, CANDIDATES, 2)
     room = room.reshape(count, CANDIDATES)
@@ -154,37 +171,26 @@ def straight(premultiplied: torch.Tensor) -> torch.Tensor:
 
 
 def _group(
-    kind: str, order: torch.Tensor, places: Places, layers: Layers, generator: torch.Generator
+    structure: Structure, order: torch.Tensor, places: Places, layers: Layers, generator: torch.Generator
 ) -> Group:
-    """Layers of one kind; the shapes of a union lie around its centre, each smaller than the whole."""
+    """Layers of one structure; the shapes of a union lie around its centre, each smaller than the whole."""
     turns = torch.rand((len(places), layers.union), generator=generator) * 2 * math.pi
     around = 2 * math.pi * torch.arange(layers.union) / layers.union + turns[:, :1]
     away = 0.0 if layers.union == 1 else 0.6 * places.sizes[:, None]
     centers = places.centers[:, None] + torch.stack([around.cos() * away, around.sin() * away], dim=2)
     sizes = (places.sizes / math.sqrt(layers.union))[:, None].expand(-1, layers.union)
-    return Group(
-        kind,
-        order,
-        {p.name: _START[p.unit](p, centers, sizes, turns) for p in KINDS[kind].parameters},
-        places.colors[:, None, :3].repeat(1, layers.union, 1),
-        places.sizes * FALLOFF,
-        places.colors[:, 3] * (OPACITY if layers.compositing == "over" else 1.0),
-        places.sizes * (SMOOTHNESS if layers.union > 1 else 0.0),
-    )
-
-
-def _start_position(
-    parameter: Parameter, centers: torch.Tensor, sizes: torch.Tensor, turns: torch.Tensor
-) -> torch.Tensor:
-    x, y = parameter.start
-    cosine, sine = turns.cos(), turns.sin()
-    return centers + torch.stack([cosine * x - sine * y, sine * x + cosine * y], dim=2) * sizes[..., None]
-
-
-# by unit: a parameter's values [N, K, P] for shapes at centres [N, K, 2], of sizes and turns [N, K]
-_START: dict[str, Callable[[Parameter, torch.Tensor, torch.Tensor, torch.Tensor], torch.Tensor]] = {
-    "position": _start_position,
-    "length": lambda p, centers, sizes, turns: torch.tensor(p.start) * sizes[..., None],
-    "angle": lambda p, centers, sizes, turns: torch.tensor(p.start) + turns[..., None],
-    "frequency": lambda p, centers, sizes, turns: torch.tensor(p.start) / sizes[..., None],
-}
+    placed = [Placed(centers[:, i], sizes[:, i], turns[:, i]) for i in range(layers.union)]
+    looks = {
+        OPACITY.name: places.colors[:, 3:] * (1.0 if layers.signed else START_OPACITY),
+        FALLOFF.name: places.sizes[:, None] * START_FALLOFF,
+        SMOOTHNESS.name: places.sizes[:, None] * START_SMOOTHNESS,
+        COLOR.name: places.colors[:, :3],
+    }
+    values = {
+        slot: looks[unit.name].clone()
+        if unit.start is None
+        else unit.start(slot.parameter.start, placed[slot.part or 0])
+        for slot in slots(structure)
+        for unit in [slot.parameter.unit]
+    }
+    return Group(structure, order, values)

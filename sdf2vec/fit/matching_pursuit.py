@@ -11,21 +11,24 @@ import torch
 
 ROUNDS = 4  # the residual is looked at anew so many times, more often where not all discs find room
 SCALE = 1.4  # from one size of disc to the next
-SMALLEST, LARGEST = 0.8, 0.3  # radius of a disc: pixels; shares of the square root of the picture's area
+SMALLEST_RADIUS, LARGEST_RADIUS = (
+    0.8,
+    0.3,
+)  # of a disc: pixels; shares of the square root of the picture's area
 WIDTH = 0.6  # standard deviation of the Gaussian that stands for a disc of radius 1
 DISC = 0.7  # amount of a disc in that of the Gaussian which fits it best: 1 / (2 − 2·exp(−u)), u = 1.256
 APART = 1.5  # radii around a disc where none is put in the same round
 
 
-class Places(NamedTuple):
-    """Discs by position in pixels [N, 2], radius in pixels [N], and what each adds [N, C]."""
+class Discs(NamedTuple):
+    """Position in pixels [N, 2], radius in pixels [N], and what each adds [N, C]."""
 
     centers: torch.Tensor
     radii: torch.Tensor
     amounts: torch.Tensor
 
 
-def find_places(residual: torch.Tensor, count: int) -> Places:
+def find_discs(residual: torch.Tensor, count: int) -> Discs:
     """The discs that take most of a residual [C, H, W] away, squared; greedy (Mallat and Zhang 1993)."""
     height, width = residual.shape[1:]
     radii = _radii(height, width)
@@ -38,7 +41,7 @@ def find_places(residual: torch.Tensor, count: int) -> Places:
         found += islice(_round(left, radii), now)
     x, y, scale = torch.tensor([disc[:3] for disc in found], dtype=torch.int64).reshape(-1, 3).unbind(1)
     amounts = [residual.new_zeros(0, len(residual)), *(amount[None] for *_, amount in found)]
-    return Places(torch.stack([x + 0.5, y + 0.5], dim=1), radii[scale], DISC * torch.cat(amounts))
+    return Discs(torch.stack([x + 0.5, y + 0.5], dim=1), radii[scale], DISC * torch.cat(amounts))
 
 
 def _round(left: torch.Tensor, radii: torch.Tensor) -> Iterator[tuple[int, int, int, torch.Tensor]]:
@@ -49,11 +52,13 @@ def _round(left: torch.Tensor, radii: torch.Tensor) -> Iterator[tuple[int, int, 
 
 
 def _radii(height: int, width: int) -> torch.Tensor:
-    longest = LARGEST * math.sqrt(height * width)
+    longest = LARGEST_RADIUS * math.sqrt(height * width)
     steps = (
-        max(1, math.floor(math.log(longest / SMALLEST) / math.log(SCALE)) + 1) if longest > SMALLEST else 1
+        max(1, math.floor(math.log(longest / SMALLEST_RADIUS) / math.log(SCALE)) + 1)
+        if longest > SMALLEST_RADIUS
+        else 1
     )
-    return SMALLEST * SCALE ** torch.arange(steps, dtype=torch.float32)
+    return SMALLEST_RADIUS * SCALE ** torch.arange(steps, dtype=torch.float32)
 
 
 def _responses(left: torch.Tensor, radii: torch.Tensor) -> tuple[torch.Tensor, torch.Tensor]:

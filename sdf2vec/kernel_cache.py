@@ -1,0 +1,160 @@
+"""How kernels for the CPU are compiled, and where their machine code is kept: the user's cache folder.
+
+`kernel` compiles what is called from outside, `inlined` what kernels are made of. Machine code is found again by a
+fingerprint of all that was compiled into it, so that a kernel may call what another module defines; numba's own
+`cache=True` looks at one file's time of change only. Where the folder can't be written to, kernels are compiled anew
+in every run, with one warning.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import importlib.util
+import os
+import pickle
+import sys
+import warnings
+from collections.abc import Callable, Iterator
+from functools import cache
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from types import FunctionType, ModuleType
+from typing import Any
+
+import llvmlite
+import numba
+import numpy as np
+import platformdirs
+from numba.core import caching, compiler, serialize
+
+from .errors import Sdf2vecError
+from .files import write_atomically
+
+FLAGS: dict[str, Any] = {
+    "fastmath": {"reassoc", "nsz", "arcp", "contract", "afn"},
+    "error_model": "numpy",  # what lets LLVM vectorise divisions
+    "nogil": True,
+}
+DIGEST = hashlib.sha256().digest_size
+
+inlined: Callable[[Callable[..., Any]], Any] = numba.njit(**FLAGS, forceinline=True)
+
+
+def kernel(function: FunctionType) -> Any:
+    """Decorator: compiled when first called; the machine code is kept.
+
+    What it calls is to be `inlined`: were that kept, too, a fresh compilation and one from disk could link different
+    copies of a function, which differ in the last digits.
+    """
+    dispatcher = numba.njit(**FLAGS)(function)
+    dispatcher._cache = _Kept(function)
+    return dispatcher
+
+
+@cache
+def load(source: str) -> ModuleType:
+    """The module of this text. Its kernels are compiled when they are first called."""
+    module = ModuleType(f"sdf2vec_{_hash(source)}")
+    sys.modules[module.__name__] = module  # numba looks there for the module of what it has kept
+    exec(compile(source, module.__name__, "exec"), module.__dict__)
+    return module
+
+
+@cache
+def load_file(source: str) -> ModuleType:
+    """The module of this text, always from a file: Triton reads the text of its functions from there.
+
+    Without a cache folder the file is in a temporary one, which is removed when the program ends.
+    """
+    path = cache_folder() / f"kernels_{_hash(source)}.py"
+    try:
+        if not path.exists():
+            write_atomically(path, source.encode())
+    except (Sdf2vecError, OSError):
+        _warn_once(cache_folder())
+        path = Path(_temporary_folder().name) / path.name
+        write_atomically(path, source.encode())
+    spec = importlib.util.spec_from_file_location(path.stem, path)
+    assert spec is not None
+    assert spec.loader is not None
+    module = importlib.util.module_from_spec(spec)
+    sys.modules[path.stem] = module
+    spec.loader.exec_module(module)
+    return module
+
+
+def is_compiled(dispatcher: Any) -> bool:
+    """Whether a kernel has been compiled before on this machine."""
+    return any(cache_folder().glob(f"{_stem(dispatcher.py_func)}-*"))
+
+
+def cache_folder() -> Path:
+    """`$SDF2VEC_CACHE`, or the user's cache folder as the system has it."""
+    return Path(os.environ.get("SDF2VEC_CACHE") or platformdirs.user_cache_path("sdf2vec", appauthor=False))
+
+
+class _Kept(caching.NullCache):
+    """The machine code of one kernel, a file for each signature: a digest, then what numba makes of it."""
+
+    def __init__(self, function: FunctionType) -> None:
+        self.function = function
+
+    def load_overload(self, signature: object, target: Any) -> Any:
+        """What was compiled for a signature; None where there is nothing, or it is damaged."""
+        target.refresh()
+        try:
+            data = self._path(signature, target.codegen()).read_bytes()
+            if hashlib.sha256(data[DIGEST:]).digest() != data[:DIGEST]:
+                return None
+            return compiler.CompileResult._rebuild(target, *pickle.loads(data[DIGEST:]))
+        except OSError:
+            return None
+
+    def save_overload(self, signature: object, compiled: Any) -> None:
+        """Keeps what was compiled for a signature."""
+        data = serialize.dumps(compiled._reduce())
+        try:
+            path = self._path(signature, compiled.codegen)
+            write_atomically(path, hashlib.sha256(data).digest() + data)
+        except (Sdf2vecError, OSError):
+            _warn_once(cache_folder())
+
+    def _path(self, signature: object, codegen: Any) -> Path:
+        name = f"{_stem(self.function)}-{_hash(signature, codegen.magic_tuple())}.kernel"
+        return cache_folder() / name
+
+
+@cache
+def _stem(function: FunctionType) -> str:
+    """How the files of a kernel begin; differs where what was compiled, or what compiles, differs."""
+    versions = numba.__version__, llvmlite.__version__, np.__version__, sys.version
+    flags = sorted(map(str, FLAGS["fastmath"]))
+    return f"{function.__module__}.{function.__name__}-{_hash(*versions, *flags, *_parts(function))}"
+
+
+def _parts(function: FunctionType) -> Iterator[object]:
+    """The code and the constants of a function and of all compiled ones that it calls."""
+    code = function.__code__
+    yield from (code.co_code, code.co_consts, code.co_names)
+    for name in code.co_names:
+        value: Any = function.__globals__.get(name)
+        if isinstance(value, (bool, int, float, tuple, np.generic, np.ndarray)):
+            yield from (np.asarray(value).dtype, np.asarray(value).tolist())
+        elif hasattr(value, "py_func"):
+            yield from _parts(value.py_func)
+
+
+def _hash(*parts: object) -> str:
+    return hashlib.sha256("\n".join(map(repr, parts)).encode()).hexdigest()[:20]
+
+
+@cache
+def _temporary_folder() -> TemporaryDirectory[str]:
+    return TemporaryDirectory(prefix="sdf2vec-")
+
+
+@cache
+def _warn_once(folder: Path) -> None:
+    warnings.warn(
+        f"cannot write to {folder}: kernels are compiled anew in every run", RuntimeWarning, stacklevel=4
+    )

@@ -1,0 +1,54 @@
+"""The threads that kernels run in: how many, the pool of them, and torch's own out of their way."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable, Iterable, Iterator
+from concurrent.futures import ThreadPoolExecutor
+from contextlib import contextmanager
+from functools import cache
+from typing import Any, TypeVar
+
+import torch
+
+T = TypeVar("T")
+R = TypeVar("R")
+
+
+@contextmanager
+def threads_of_its_own() -> Iterator[None]:
+    """Torch on one thread meanwhile: its waiting threads would spin on the cores that the kernels need."""
+    before = torch.get_num_threads()
+    torch.set_num_threads(1)
+    try:
+        yield
+    finally:
+        torch.set_num_threads(before)
+
+
+def in_threads(function: Callable[..., object], *arguments: Any) -> None:
+    """Runs function(first, step, …) in every thread, which is to take each step-th piece of work."""
+    count = threads()
+    in_threads_each(lambda first: function(first, count, *arguments), range(count))
+
+
+def in_threads_each(function: Callable[[T], R], items: Iterable[T]) -> list[R]:
+    """The function's results for all items, computed in the pool's threads."""
+    return list(map(function, items) if threads() == 1 else _pool().map(function, items))
+
+
+def threads() -> int:
+    """How many threads there are: `$SDF2VEC_THREADS`, or one for each core that this process may use."""
+    asked = os.environ.get("SDF2VEC_THREADS", "")
+    return max(1, int(asked)) if asked.isdigit() else available_cores()
+
+
+@cache
+def available_cores() -> int:
+    """Cores that this process may use."""
+    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+
+
+@cache
+def _pool() -> ThreadPoolExecutor:
+    return ThreadPoolExecutor(max(available_cores(), threads()), thread_name_prefix="sdf2vec")
