@@ -12,13 +12,14 @@ import sdf2vec.render  # noqa: F401 (see above)
 
 from .api import check, export, fit, render
 from .errors import Sdf2vecError
-from .scene import Layer, Scene, SceneError, Shape, dumps, load, loads, save
+from .scene import Joint, Layer, Scene, SceneError, Shape, dumps, load, loads, save
 from .shapes import KINDS
 
 __version__ = "0.1.0"
 
 __all__ = [
     "KINDS",
+    "Joint",
     "Layer",
     "Scene",
     "SceneError",

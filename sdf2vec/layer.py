@@ -30,7 +30,7 @@ P, PIXEL = var("p", VEC2), var("pixel")
 
 
 class Part(NamedTuple):
-    """One shape of a layer: names of its kind and its paint, and of how it is joined to those before it ("" for the first)."""
+    """One shape of a layer: names of its kind, its paint, and how it is joined to those before it ("" for the first)."""
 
     kind: str
     paint: str = FLAT
@@ -226,7 +226,7 @@ class Formula:
 
 
 def shape_at(kind: Kind, paint: Paint, parameters: Sequence[Expr], values: Sequence[Expr]) -> Expr:
-    """Colour and field of one shape at the point `p`, vec4; the field is its signed distance, for a patch its coverage."""
+    """Colour and field (signed distance, for a patch coverage) of one shape at the point `p`, vec4."""
     return vec4(_color_at(kind, paint, parameters, values), _field_at(kind, parameters))
 
 
@@ -241,7 +241,7 @@ def _field_at(kind: Kind, parameters: Sequence[Expr]) -> Expr:
 
 
 def cover_of(kind: Kind, field: Expr, falloff: Expr, compositing: str) -> Expr:
-    """Coverage from the field of a layer that begins with this kind; none where it is below 0, unless that is allowed."""
+    """Coverage from the field of a layer that begins with this kind; none where below 0, unless that is allowed."""
     if kind.patch is None:
         return coverage(field, falloff, PIXEL)
     return maximum(field, 0.0) if kind.patch.signed and not COMPOSITING[compositing].signed else field

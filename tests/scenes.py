@@ -1,51 +1,72 @@
-"""Random scenes for tests: every kind, unions, sharp and soft, opaque and translucent."""
+"""Random scenes for tests: every kind and paint, joins, sharp and soft, opaque and translucent."""
 
 import random
-from collections.abc import Mapping
+from collections.abc import Sequence
 
-from sdf2vec import Layer, Scene, Shape
+from sdf2vec import Joint, Layer, Scene, Shape
+from sdf2vec.blend import COMPOSITING, JOINS
+from sdf2vec.paints import PAINTS
 from sdf2vec.shapes import KINDS
 
-ANY_UNION = dict.fromkeys(KINDS, (2, 3))
+PATCHES = tuple(name for name, kind in KINDS.items() if kind.patch is not None)
+SOFT = tuple(name for name in KINDS if name not in PATCHES)  # kinds with a soft edge, which can be joined
 
 
-def random_shape(kind: str, r: random.Random, lowest: float = 0.0) -> Shape:
-    color = (r.uniform(lowest, 1), r.uniform(lowest, 1), r.uniform(lowest, 1))
+def random_shape(kind: str, r: random.Random, lowest: float = 0.0, paint: str = "flat") -> Shape:
+    def color():
+        return (r.uniform(lowest, 1), r.uniform(lowest, 1), r.uniform(lowest, 1))
+
+    first = color()
     x, y = r.uniform(-0.7, 0.7), r.uniform(-0.5, 0.5)
     size = r.uniform(0.05, 0.35)
+    patch = (x, y, size * 0.5, size * 0.5 * r.uniform(0.3, 1.2), r.uniform(-7, 7))
     numbers = {
         "circle": lambda: (x, y, size),
         "ellipse": lambda: (x, y, size, size * r.uniform(0.2, 1.2), r.uniform(-7, 7)),
         "box": lambda: (x, y, size, size * r.uniform(0.2, 1.2), r.uniform(-7, 7), r.choice([0.0, 0.02, 0.5])),
         "triangle": lambda: tuple(c + r.uniform(-0.4, 0.4) for c in (x, y, x, y, x, y)),
         "displaced": lambda: (x, y, size, size * 0.2, r.uniform(5, 30), r.uniform(-30, -5)),
+        "gaussian": lambda: patch,
+        "gabor": lambda: (*patch, r.uniform(-40, 40), r.uniform(0, 6)),
     }[kind]()
-    return Shape(kind, numbers, color)
+    own = {"flat": tuple, "linear": lambda: (*color(), r.uniform(-1, 1), r.uniform(-1, 1))}[paint]()
+    return Shape(kind, numbers, first, paint, own)
 
 
-def random_layer(kind: str, r: random.Random, compositing: str, union: int = 1) -> Layer:
-    lowest = -1.0 if compositing == "additive" else 0.0
+def random_layer(
+    kinds: Sequence[str],
+    r: random.Random,
+    compositing: str,
+    paint: str = "flat",
+    joins: Sequence[str] = ("union",),
+) -> Layer:
+    """A layer of one shape of each kind, joined in one of these ways."""
+    lowest = COMPOSITING[compositing].lowest
     falloff = r.choice([0.0, 0.003, 0.05, 0.3])
     opacity = r.choice([1.0, r.uniform(lowest, 1.0)])
-    shapes = tuple(random_shape(kind, r, lowest) for _ in range(union))
-    return Layer(shapes, falloff, opacity, r.uniform(0.01, 0.1) if union > 1 else 0.0)
+    shapes = tuple(random_shape(kind, r, lowest, paint) for kind in kinds)
+    joints = tuple(Joint(r.choice(joins), r.choice([0.0, r.uniform(0.01, 0.1)])) for _ in shapes[1:])
+    return Layer(shapes, falloff, opacity, joints)
 
 
 def random_scene(
-    kinds: tuple[str, ...] = tuple(KINDS),
+    kinds: Sequence[str] = tuple(KINDS),
     compositing: str = "over",
     layers: int = 8,
     seed: int = 0,
     width: int = 60,
     height: int = 40,
     transparent: bool = False,
-    unions: Mapping[str, tuple[int, ...]] = ANY_UNION,
+    paints: Sequence[str] = tuple(PAINTS),
+    joins: Sequence[str] = tuple(JOINS),
 ) -> Scene:
-    """A scene in which every third layer is a union, of as many shapes as `unions` allows for its kind."""
+    """A scene in which every third layer is joined of two or three shapes, where there are joins."""
     r = random.Random(seed)
     made = []
     for i in range(layers):
         kind = kinds[i % len(kinds)]
-        made.append(random_layer(kind, r, compositing, r.choice(unions.get(kind, (1,))) if i % 3 == 2 else 1))
+        several = i % 3 == 2 and kind in SOFT and bool(joins)
+        more = r.choices([k for k in kinds if k in SOFT], k=r.choice((1, 2))) if several else ()
+        made.append(random_layer((kind, *more), r, compositing, paints[i % len(paints)], joins))
     background = None if transparent else (r.random(), r.random(), r.random())
     return Scene(width, height, tuple(made), background, compositing)

@@ -56,11 +56,8 @@ def importance(
 
 def _linear_in(group: Group, tensors: SceneTensors) -> list[torch.Tensor]:
     """What an image is linear in, such that a group's layers are left out where it is 0; of that what can move."""
-    found = (
-        [group.opacity, *group.colors]
-        if "color" in COMPOSITING[tensors.compositing].linear_in
-        else [group.opacity]
-    )
+    named = {"opacity": [group.opacity], "color": group.colors}
+    found = [tensor for name in COMPOSITING[tensors.compositing].linear_in for tensor in named[name]]
     return [tensor for tensor in found if tensor.requires_grad]
 
 
