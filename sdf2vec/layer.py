@@ -22,6 +22,7 @@ from .paints import FLAT, PAINTS, Paint
 from .shapes import KINDS, Kind
 from .units import FALLOFF, OPACITY, SMOOTHNESS, Parameter
 
+ROW_OPACITY = 1  # place of the opacity among `Formula.uniforms`
 NEVER = 1e9  # scene units: a distance that is never met
 LOOK = (Parameter("opacity", OPACITY, (1.0,)), Parameter("falloff", FALLOFF))
 JOIN = Parameter("smoothness", SMOOTHNESS)
@@ -30,7 +31,7 @@ P, PIXEL = var("p", VEC2), var("pixel")
 
 
 class Part(NamedTuple):
-    """One shape of a layer: names of its kind, its paint, and how it is joined to those before it ("" for the first)."""
+    """One shape of a layer: names of its kind, its paint, and its join to those before it ("" for the first)."""
 
     kind: str
     paint: str = FLAT
@@ -104,7 +105,7 @@ def constant_row(structure: Structure, numbers: Sequence[float]) -> Row:
 
 def _constant(values: Sequence[float]) -> Expr:
     exprs = [const(value) for value in values]
-    return {1: lambda x: x, 2: vec2, 3: vec3}[len(exprs)](*exprs)
+    return exprs[0] if len(exprs) == 1 else operation(VECTOR[len(exprs)].value, *exprs)
 
 
 @dataclass(frozen=True)

@@ -16,8 +16,8 @@ from .units import COLOR, DIRECTION, Parameter
 @dataclass(frozen=True)
 class Paint:
     """`color(q, color, *own)` is the colour (vec3) at a point q of the shape's frame, in which the shape reaches from
-    about −1 to 1 along both axes. `own` are the parameters after `color`. `ramp` tells vector formats of one that is a linear gradient:
-    from its own parameters' values the points of the frame where it has its first and its last colour.
+    about −1 to 1 along both axes. `own` are the parameters after `color`. `ramp` is for vector formats: from the values
+    of its own parameters the points of the frame where a linear gradient has its first and its last colour.
     """
 
     name: str

@@ -130,7 +130,7 @@ def _in_range(parameter: Parameter, value: float, path: str) -> None:
 class Shape:
     """One shape: kind, parameters as one flat row in the order that the kind declares them, colour.
 
-    `paint` names what is made of the colour, with `paint_parameters` as one flat row of what the paint declares after it.
+    `paint` names what is made of the colour, with `paint_parameters` as one flat row of what it declares after that.
     Raises SceneError for an unknown kind or paint, or a number out of range.
     """
 
@@ -185,7 +185,8 @@ class Layer:
     """A sequence of shapes joined left to right by smooth union, subtraction or intersection.
 
     `falloff` is a length in scene units, without meaning for a patch. `opacity` is 0..1; in an additive scene it is
-    what the layer adds to alpha, −1..1. `joints` say how each shape but the first is joined, 0 being sharp. Raises SceneError.
+    what the layer adds to alpha, −1..1. `joints` say how each shape but the first is joined, 0 being sharp.
+    Raises SceneError.
     """
 
     shapes: tuple[Shape, ...]

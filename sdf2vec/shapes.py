@@ -84,7 +84,7 @@ Outline = EllipseOutline | RectangleOutline | PolygonOutline
 
 @dataclass(frozen=True)
 class Frame:
-    """The coordinates in which a shape is painted: the middle (vec2), the direction of x (vec2), half the size (vec2)."""
+    """The coordinates in which a shape is painted: its middle, the direction of x, half its size; vec2 each."""
 
     origin: Expr
     axis: Expr
@@ -378,7 +378,7 @@ def _widened(radii: Expr, pixel: Expr) -> Expr:
 
 @function("gaussianCover", q=VEC2, radii=VEC2, pixel=FLOAT)
 def gaussian_cover(q: Expr, radii: Expr, pixel: Expr) -> Expr:
-    """A Gaussian of these standard deviations that is 1 in its middle, 0 where it is next to nothing, and never finer than pixels."""
+    """A Gaussian of these standard deviations, 1 in its middle and 0 far away, as a box of one pixel blurs it."""
     wide = let("wide", _widened(radii, pixel))
     r = let("r", q / wide)
     height = radii.x * radii.y / (wide.x * wide.y)

@@ -49,7 +49,7 @@ class Fractions(NamedTuple):
 
 @dataclass(frozen=True)
 class Codec:
-    """How a packed scene says a number. `decode`: its value from a fraction 0..1 of `power` at which it is finer near 0.
+    """How a packed scene says a number: `decode` gives its value from a fraction 0..1, as a polynomial of this `power`.
 
     `precision`: whose bits it has: "place" (as many as the layer's edge needs) or those of a field of its own.
     """
@@ -65,8 +65,9 @@ class Unit:
 
     `low` and `high` bound it in a scene, where it has so many `decimals`. `rate` is Adam's for one step on a canvas
     of area 1; it grows with the power `scaling` of the square root of the canvas' area, and falls with the number of
-    layers where they are `crowded`. `start(values, placed)` is where a parameter starts whose values are for a shape of size 1
-    at the origin, [N, width]. `project(values, positive, room)` moves a fit's values [N, width] into their range, in place.
+    layers where they are `crowded`. `start(values, placed)` is where a parameter starts, [N, width], whose values are
+    for a shape of size 1 at the origin. `project(values, positive, room)` moves a fit's values [N, width] into their
+    range, in place.
     """
 
     name: str

@@ -390,8 +390,9 @@ def _legal(value: float, parameter: Parameter) -> float:
 class Layout:
     """Where the numbers of a packed layer are.
 
-    A layer is: its box of cells, bits more than the least, variant (or with joins: number of shapes), falloff, opacity; then its
-    shapes: (variant, join, smoothness,) colours, places. With joins all shapes of a layer are as long as the longest could be.
+    A layer is: its box of cells, bits more than the least, variant (or with joins: number of shapes), falloff,
+    opacity; then its shapes: (variant, join, smoothness,) colours, places. With joins all shapes of a layer are as
+    long as the longest could be.
     """
 
     variants: tuple[Variant, ...]

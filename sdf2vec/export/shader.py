@@ -13,8 +13,8 @@ from numpy.typing import NDArray
 
 from ..blend import BREATH, COMPOSITING, FRAMINGS, breath, display, grid_point, surface_point
 from ..errors import Sdf2vecError
-from ..expr import VEC2, VEC4, Expr, const, var, vec2, vec4
-from ..layer import PIXEL, STILL, Formula, P, constant_row
+from ..expr import VEC2, Expr, const, var, vec2, vec4
+from ..layer import STILL, Formula, P, constant_row
 from ..lower.shader import GLSL, WGSL, Dialect, definition, expression, literal, statements, used_functions
 from ..paints import FLAT
 from ..scene import Layer, Scene

@@ -11,8 +11,8 @@ from functools import cache
 import torch
 from torch.utils.checkpoint import checkpoint
 
-from ..lower.torch import Tensors, compile_torch
 from ..layer import Formula, Structure
+from ..lower.torch import Tensors, compile_torch
 from .fused import uniform_rows
 from .reference import canvas, composite_points
 from .tensors import Group, SceneTensors

@@ -13,18 +13,16 @@ from typing import Any
 
 import numpy as np
 import torch
-from numpy.typing import NDArray
 from torch.autograd.function import once_differentiable
 
+from ..arrays import BoolArray, Float32Array, Int32Array, IntArray
 from ..blend import COMPOSITING
 from ..layer import Structure
 from ..threads import in_threads
-from . import kernels
-from .kernels import TILE
+from . import kernels, tiling
 from .reference import canvas_axes
 from .tensors import Group, SceneTensors
-
-Floats = NDArray[np.float32]
+from .tiling import TILE
 
 
 def composite(tensors: SceneTensors, width: int, height: int, channels: int = 4) -> torch.Tensor:
@@ -46,9 +44,8 @@ def _canvas(tensors: SceneTensors, width: int, height: int, channels: int) -> tu
     module = kernels.load(structures, tensors.compositing, channels)
     order = _draw_order(tensors)
     index = np.repeat(np.arange(len(structures)), list(map(len, tensors.groups)))[order.numpy()]
-    canvas = _Canvas(
-        module, index, channels, width, height, *axes, hides=COMPOSITING[tensors.compositing].hides
-    )
+    solid, hides = kernels.solid_ones(structures)[index], COMPOSITING[tensors.compositing].hides
+    canvas = _Canvas(module, index, solid, channels, width, height, *axes, hides=hides)
     return canvas, rows_of(tensors.groups, float(axes[2]))[order]
 
 
@@ -76,8 +73,7 @@ def bins_of(tensors: SceneTensors, width: int, height: int) -> Bins:
 def extents_of(tensors: SceneTensors, width: int, height: int) -> tuple[torch.Tensor, torch.Tensor]:
     """The corners [L, 2] of the boxes outside of which the layers cover nothing, in scene units."""
     canvas, rows = _canvas(tensors, width, height, 3)
-    bounds = [canvas.module.bounds(kind, row) for kind, row in zip(canvas.kinds, _array(rows), strict=True)]
-    boxes = torch.tensor(np.array(bounds)[:, :4])
+    boxes = torch.from_numpy(_bounds(canvas, _array(rows))[:, :4])
     return boxes[:, :2], boxes[:, 2:]
 
 
@@ -98,12 +94,13 @@ class _Canvas:
     """What a render needs besides the numbers of the scene."""
 
     module: ModuleType
-    kinds: NDArray[np.int64]  # [L]
+    kinds: IntArray  # [L]
+    solid: BoolArray  # [L] whether a layer can cover a tile in its own colours
     channels: int
     width: int
     height: int
-    x: Floats  # of the pixel centres, padded to whole tiles
-    y: Floats
+    x: Float32Array  # of the pixel centres, padded to whole tiles
+    y: Float32Array
     pixel: np.float32
     hides: bool  # an opaque layer hides what is below it
 
@@ -120,22 +117,32 @@ class _Canvas:
 class Bins:
     """Which layers touch each tile: those of tile t are layers[starts[t]:starts[t + 1]], in draw order."""
 
-    starts: NDArray[np.int64]
-    layers: NDArray[np.int32]
-    spans: NDArray[np.int32]  # [pairs, 2] rows of the tile that the layer may touch; 0, 0 where it covers it
+    starts: IntArray
+    layers: Int32Array
+    spans: Int32Array  # [pairs, 2] rows of the tile that the layer may touch; 0, 0 where it covers it
 
 
-def _bin(canvas: _Canvas, rows: Floats) -> Bins:
-    module, count = canvas.module, len(canvas.kinds)
-    limits, ranges = np.empty((count, 5), np.float32), np.empty((count, 4), np.int64)
-    place = (canvas.x, canvas.y, canvas.pixel, canvas.columns)
-    most = module.measure(canvas.kinds, rows, *place, canvas.rows, limits, ranges)
+def _bin(canvas: _Canvas, rows: Float32Array) -> Bins:
+    count, place = len(canvas.kinds), (canvas.x, canvas.y, canvas.pixel, canvas.columns)
+    bounds, ranges = _bounds(canvas, rows), np.empty((count, 4), np.int64)
+    most = tiling.find_ranges(bounds, *place, canvas.rows, ranges)
     tiles, layers, spans = np.empty(most, np.int32), np.empty(most, np.int32), np.empty((most, 2), np.int32)
-    pairs = module.find_pairs(canvas.kinds, rows, *place, limits, ranges, tiles, layers, spans)
+    centers = np.empty((most, 2), np.float32)
+    pairs = tiling.list_candidates(bounds, ranges, *place, tiles, layers, spans, centers)
+    distances = np.empty(pairs, np.float32)
+    canvas.module.measure_distances(canvas.kinds, rows, layers, centers, distances)
+    pairs = tiling.keep_touching(pairs, distances, bounds, canvas.solid, canvas.pixel, tiles, layers, spans)
     starts = np.zeros(canvas.columns * canvas.rows + 1, np.int64)
     sorted_layers, sorted_spans = np.empty(pairs, np.int32), np.empty((pairs, 2), np.int32)
-    module.sort_pairs(pairs, tiles, layers, spans, starts, sorted_layers, sorted_spans)
+    tiling.sort_pairs(pairs, tiles, layers, spans, starts, sorted_layers, sorted_spans)
     return Bins(starts, sorted_layers, sorted_spans)
+
+
+def _bounds(canvas: _Canvas, rows: Float32Array) -> Float32Array:
+    """The bounds of every layer [L, 7]: `layer.Formula.bounds`."""
+    bounds = np.empty((len(canvas.kinds), tiling.LIMITS), np.float32)
+    canvas.module.measure_bounds(canvas.kinds, rows, bounds)
+    return bounds
 
 
 class _Composite(torch.autograd.Function):
@@ -161,10 +168,10 @@ class _Composite(torch.autograd.Function):
         ground = np.zeros((len(bins.starts) - 1, 4), np.float32)
         in_threads(canvas.module.backward_tiles, *ctx.shared, _array(cotangent), longest, grads, ground)
         totals = np.zeros((len(canvas.kinds), width), np.float64)
-        canvas.module.reduce_pairs(bins.layers, grads, totals)
+        tiling.reduce_pairs(bins.layers, grads, totals)
         background = ground.sum(axis=0, dtype=np.float64)
         return None, *(torch.from_numpy(part.astype(np.float32)) for part in (totals, background))
 
 
-def _array(tensor: torch.Tensor) -> Floats:
+def _array(tensor: torch.Tensor) -> Float32Array:
     return np.ascontiguousarray(tensor.detach().numpy(), dtype=np.float32)

@@ -10,18 +10,16 @@ from dataclasses import replace
 from functools import cache
 from types import ModuleType
 
+import numpy as np
+
 from .. import kernel_cache
+from ..arrays import BoolArray
 from ..expr import VEC4, Expr, components_of, scalarize, var, walk
 from ..layer import Formula, P, Structure
 from ..lower.numba import PREAMBLE, Block, backward, forward, scalar
 from ..templating import template
 
-TILE = 16  # pixels along a side of a tile, the block that kernels work on
-PIXELS = TILE * TILE
-
-
 BELOW = var("below", VEC4)
-ROW_OPACITY = 1  # its place in a layer's row of numbers: `Formula.uniforms`
 
 
 def drawn(formula: Formula, name: str, compositing: str, channels: int) -> Block:
@@ -72,15 +70,15 @@ def text(structures: tuple[Structure, ...], compositing: str, channels: int) -> 
     solid = solid_blocks(formulas, compositing, channels)
     for block in dict.fromkeys(block for block in solid if block):
         parts += _both_ways(block, channels)
-    driver = template("tiles.py.jinja").render(
-        tile=TILE,
-        pixels=PIXELS,
-        farthest=(TILE - 1) / 2 * 2**0.5,
-        channels=channels,
-        solid=[block.name if block else None for block in solid],
-        opacity=ROW_OPACITY,
-    )
+    names = [block.name if block else None for block in solid]
+    driver = template("tiles.py.jinja").render(channels=channels, solid=names)
     return "\n\n".join([*parts, driver])
+
+
+@cache
+def solid_ones(structures: tuple[Structure, ...]) -> BoolArray:
+    """Whether layers of each structure can cover a region in their own colours, [structures]."""
+    return np.array([Formula.of(structure).is_solid for structure in structures])
 
 
 def _both_ways(block: Block, channels: int) -> tuple[str, str]:

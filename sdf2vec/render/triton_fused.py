@@ -16,11 +16,12 @@ import torch
 from torch.autograd.function import once_differentiable
 
 from ..blend import COMPOSITING
+from ..layer import ROW_OPACITY
 from . import triton_kernels
 from .fused import rows_of, structures_of
-from .kernels import PIXELS, ROW_OPACITY, TILE
 from .reference import canvas_axes
 from .tensors import SceneTensors
+from .tiling import PIXELS, TILE
 
 SCRATCH = 1 << 29  # bytes
 WARPS = 4  # of 32 threads, for the 256 pixels of a tile; with fewer, unions run out of registers

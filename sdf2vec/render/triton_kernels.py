@@ -14,7 +14,8 @@ from ..layer import Formula, P, Structure
 from ..lower.block import Block
 from ..lower.triton import PREAMBLE, backward, forward
 from ..templating import template
-from .kernels import PIXELS, TILE, carried, drawn, solid_blocks
+from .kernels import carried, drawn, solid_blocks
+from .tiling import PIXELS, TILE
 
 MEASURED = 64  # tiles whose distance from a layer is looked at at once
 REDUCED = 32  # pairs whose derivatives are added up at once

@@ -1,0 +1,157 @@
+"""Which layers touch each tile of a canvas, and how tiles meet an image: the compiled loops that know no formula."""
+
+from math import ceil, floor
+
+import numpy as np
+
+from ..kernel_cache import inlined, kernel
+from ..layer import ROW_OPACITY
+from ..lower.numba_math import ONE, ZERO, f32
+
+TILE = 16  # pixels along a side of a tile, the block that kernels work on
+PIXELS = TILE * TILE
+FARTHEST = f32((TILE - 1) / 2 * 2**0.5)  # pixels from the centre of a tile to its farthest pixel centre
+MIDDLE = f32((TILE - 1) / 2)  # pixels from the first pixel of a tile to its centre
+LOW_X, LOW_Y, HIGH_X, HIGH_Y, OUTER, INNER, SLOPE = range(7)  # columns of bounds: `layer.Formula.bounds`
+LIMITS = 7
+
+
+@kernel
+def find_ranges(bounds, x, y, pixel, columns, rows, ranges):
+    """The range of tiles that every layer may touch (first and end column, then row); returns how many in all."""
+    total, side = 0, TILE * pixel
+    for layer in range(bounds.shape[0]):
+        b = bounds[layer]
+        ranges[layer, 0] = max(0, min(columns, floor((b[LOW_X] - x[0]) / side + f32(0.03))))
+        ranges[layer, 1] = max(0, min(rows, floor((b[LOW_Y] - y[0]) / side + f32(0.03))))
+        ranges[layer, 2] = max(
+            ranges[layer, 0], min(columns, floor((b[HIGH_X] - x[0]) / side + f32(0.01)) + 1)
+        )
+        ranges[layer, 3] = max(ranges[layer, 1], min(rows, floor((b[HIGH_Y] - y[0]) / side + f32(0.01)) + 1))
+        total += (ranges[layer, 2] - ranges[layer, 0]) * (ranges[layer, 3] - ranges[layer, 1])
+    return total
+
+
+@kernel
+def list_candidates(bounds, ranges, x, y, pixel, columns, tiles, layers, spans, centers):
+    """Pairs of a layer and a tile in its range, in draw order: the rows of the tile that it may touch, and the tile's
+    centre; returns how many."""
+    count = 0
+    middle = MIDDLE * pixel
+    for layer in range(bounds.shape[0]):
+        for row in range(ranges[layer, 1], ranges[layer, 3]):
+            top = y[row * TILE]
+            low = max(0, ceil((bounds[layer, LOW_Y] - top) / pixel - f32(0.01)))
+            high = min(TILE, floor((bounds[layer, HIGH_Y] - top) / pixel + f32(0.01)) + 1)
+            if low >= high:
+                continue
+            for column in range(ranges[layer, 0], ranges[layer, 2]):
+                tiles[count], layers[count] = row * columns + column, layer
+                spans[count, 0], spans[count, 1] = low, high
+                centers[count, 0], centers[count, 1] = x[column * TILE] + middle, top + middle
+                count += 1
+    return count
+
+
+@kernel
+def keep_touching(count, distances, bounds, solid, pixel, tiles, layers, spans):
+    """Keeps, in place, the pairs whose layer covers some of the tile, by its distance at the tile's centre; returns
+    how many. Rows become (0, 0) where a layer that is `solid` [L] covers all of the tile."""
+    kept = 0
+    for i in range(count):
+        layer = layers[i]
+        around = FARTHEST * pixel * bounds[layer, SLOPE] * f32(1.001)
+        if distances[i] - around < bounds[layer, OUTER]:
+            tiles[kept], layers[kept] = tiles[i], layer
+            covered = solid[layer] and distances[i] + around < bounds[layer, INNER]
+            spans[kept, 0] = 0 if covered else spans[i, 0]
+            spans[kept, 1] = 0 if covered else spans[i, 1]
+            kept += 1
+    return kept
+
+
+@kernel
+def sort_pairs(count, tiles, layers, spans, starts, sorted_layers, sorted_spans):
+    """Groups the pairs by tile, keeping the draw order; `starts` is where each tile's begin."""
+    for i in range(count):
+        starts[tiles[i] + 1] += 1
+    for t in range(starts.size - 1):
+        starts[t + 1] += starts[t]
+    places = starts[:-1].copy()
+    for i in range(count):
+        place = places[tiles[i]]
+        sorted_layers[place] = layers[i]
+        sorted_spans[place, 0], sorted_spans[place, 1] = spans[i, 0], spans[i, 1]
+        places[tiles[i]] += 1
+
+
+@kernel
+def reduce_pairs(layers, grads, totals):
+    """Adds the pairs' derivatives up by layer, in a fixed order."""
+    for q in range(layers.size):
+        for i in range(grads.shape[1]):
+            totals[layers[q], i] += grads[q, i]
+
+
+@inlined
+def lowest_visible(start, end, layers, spans, uniforms, hides):
+    """The first pair of a tile that is not wholly hidden by an opaque one above it."""
+    if hides:
+        for q in range(end - 1, start, -1):
+            if spans[q, 1] == 0 and uniforms[layers[q], ROW_OPACITY] == ONE:
+                return q
+    return start
+
+
+@inlined
+def place_pixels(top, left, x, y, px, py):
+    """The scene's points at a tile's pixels."""
+    for r in range(TILE):
+        for s in range(TILE):
+            px[r * TILE + s] = x[left + s]
+            py[r * TILE + s] = y[top + r]
+
+
+@inlined
+def fill_tile(background, tile):
+    """One colour all over a tile [C, pixels]."""
+    for c in range(tile.shape[0]):
+        tile[c, :] = background[c]
+
+
+@inlined
+def tile_to_image(top, left, tile, image):
+    """Writes a tile [C, pixels] to its place in an image [C, H, W], as far as it reaches."""
+    height, width = image.shape[1:]
+    for c in range(tile.shape[0]):
+        for r in range(min(TILE, height - top)):
+            line, row = image[c, top + r, left:], tile[c, r * TILE :]
+            if width - left >= TILE:
+                for s in range(TILE):
+                    line[s] = row[s]
+            else:
+                for s in range(width - left):
+                    line[s] = row[s]
+
+
+@inlined
+def image_to_tile(top, left, image, tile):
+    """Reads a tile [C, pixels] from its place in an image [C, H, W]; 0 beyond that."""
+    height, width = image.shape[1:]
+    if height - top < TILE or width - left < TILE:
+        tile[:] = ZERO
+    for c in range(tile.shape[0]):
+        for r in range(min(TILE, height - top)):
+            line, row = image[c, top + r, left:], tile[c, r * TILE :]
+            if width - left >= TILE:
+                for s in range(TILE):
+                    row[s] = line[s]
+            else:
+                for s in range(width - left):
+                    row[s] = line[s]
+
+
+@inlined
+def scratch(channels):
+    """Room for a tile's points, x and y, and for its colours [C, pixels]."""
+    return np.empty(PIXELS, f32), np.empty(PIXELS, f32), np.empty((channels, PIXELS), f32)
