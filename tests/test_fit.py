@@ -80,6 +80,24 @@ def test_every_loss_is_zero_when_equal_and_falls_in_a_fit(loss):
     assert coarse[-1] < 0.5 * coarse[0]
 
 
+@pytest.mark.parametrize("loss", backends.CPU.losses)
+def test_what_a_backend_computes_faster_is_the_same_loss(loss):
+    target, render = as_tensor(picture()), as_tensor(picture()).flip(2) * 0.9
+    render.requires_grad_()
+    values = [maker[loss](target)(render) for maker in (losses.LOSSES, backends.CPU.losses)]
+    exact, fast = (torch.autograd.grad(value, render)[0] for value in values)
+    assert values[1].item() == pytest.approx(values[0].item(), abs=1e-5)
+    assert float((fast - exact).abs().max()) <= 1e-3 * float(exact.abs().max())
+
+
+def test_a_backends_losses_take_the_place_of_those_of_their_names():
+    target = as_tensor(picture())
+    found = losses.objective(
+        (("mse", 2.0), ("l1", 1.0)), target, faster={"mse": lambda _: lambda _: target.max() * 0 + 3}
+    )
+    assert float(found(target)) == 6.0
+
+
 def test_the_same_seed_gives_the_same_scene_and_another_another():
     scenes = [fit_picture(picture(), Settings(5, tuple(KINDS), preset="fast", seed=s)) for s in (1, 1, 2)]
     assert scenes[0] == scenes[1] != scenes[2]

@@ -45,7 +45,6 @@ class Flip(AnalyticLoss):
         return sum(total for total, _ in results) * float(scale), grad
 
     def _ground(self, image: Float32Array, target: Float32Array) -> tuple[float, Float32Array]:
-        to_planes, across, down = self.filters
         height = image.shape[1]
         slopes, grad = np.empty_like(image), np.empty_like(image)
         rows = [(start, min(start + ROWS, height)) for start in range(0, height, ROWS)]
@@ -53,7 +52,7 @@ class Flip(AnalyticLoss):
         def each(function: Callable[..., float], *arguments: Any) -> float:
             return sum(in_threads_each(lambda part: function(*part, *arguments), rows))
 
-        each(filter_across, image, to_planes, across, self.planes, slopes)
-        total = each(compare, self.planes, down, target, self.softness, self.seeds)
-        each(carry_back, self.seeds, to_planes, across, down, slopes, grad)
+        each(filter_across, image, self.filters, self.planes, slopes)
+        total = each(compare, self.planes, self.filters, target, self.softness, self.seeds)
+        each(carry_back, self.seeds, self.filters, slopes, grad)
         return total, grad

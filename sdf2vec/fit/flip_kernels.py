@@ -51,8 +51,9 @@ def add(weight, source, out):
 
 
 @kernel
-def filter_across(first, last, image, to_planes, across, planes, slopes):
+def filter_across(first, last, image, filters, planes, slopes):
     """What the filters give of an image along its rows; and the slopes of its linear values."""
+    to_planes, across, _ = filters
     width = image.shape[2]
     reach = across.shape[1] // 2
     linear = np.empty((3, width + 2 * reach), f32)
@@ -78,8 +79,9 @@ def filter_across(first, last, image, to_planes, across, planes, slopes):
 
 
 @kernel
-def compare(first, last, planes, down, target, softness, seeds):
+def compare(first, last, planes, filters, target, softness, seeds):
     """Σ error of these rows; `seeds` becomes its derivative by what the filters give."""
+    _, _, down = filters
     height, width = planes.shape[1:]
     reach = down.shape[1] // 2
     rows = np.empty((ROWS, BLOCK), f32)
@@ -106,8 +108,9 @@ def compare(first, last, planes, down, target, softness, seeds):
 
 
 @kernel
-def carry_back(first, last, seeds, to_planes, across, down, slopes, grad):
+def carry_back(first, last, seeds, filters, slopes, grad):
     """The derivative by the image, of that by what the filters give."""
+    to_planes, across, down = filters
     height, width = seeds.shape[1:]
     reach = across.shape[1] // 2
     row, line = np.empty(width, f32), np.empty(width + 2 * reach, f32)

@@ -55,7 +55,7 @@ Callback = Callable[[Progress], bool]  # returns True to stop
 
 
 class Stopped(Exception):  # noqa: N818 (no error)
-    """The callback wants the fit to end."""
+    """The callback has asked for the end of the fit."""
 
 
 def fit_picture(picture: Picture, settings: Settings, callback: Callback = lambda progress: False) -> Scene:
@@ -72,7 +72,7 @@ def fit_picture(picture: Picture, settings: Settings, callback: Callback = lambd
 
 @dataclass(frozen=True)
 class Stage:
-    """A phase at work: what it draws and how it measures that."""
+    """A phase with what it needs at its resolution: the target, how much each pixel matters, the loss."""
 
     phase: Phase
     target: torch.Tensor  # [C, H, W] premultiplied
@@ -104,7 +104,7 @@ class Fit:
         return phases if self.settings.start is None or len(phases) == 1 else phases[1:]
 
     def run(self) -> None:
-        """Everything, in place. When the callback stops it, what is promised of the result still holds."""
+        """The whole fit, in place. Also when it is stopped, no shape stays too thin and colours are restricted."""
         with suppress(Stopped):
             self._train_all()
         if self.settings.palette or self.settings.colors:
