@@ -240,13 +240,6 @@ class Scene:
         shortest = min(self.width, self.height)
         return self.width / shortest, self.height / shortest
 
-    def to(self, target: str, **options: Any) -> str | bytes:
-        """The scene exported, as in `scene.to("glsl")`; see `sdf2vec.export`."""
-        from .export import export
-        from .export.options import Options
-
-        return export(self, target, Options(**options))
-
 
 def _check_color(color: Color, path: str, lowest: float) -> None:
     for index, value in enumerate(color):

@@ -22,6 +22,7 @@ from ..lower.shader import GLSL, definition, expression, used_functions
 from ..scene import FORMAT, MAX_UNION, VERSION, Scene
 from ..shapes import KINDS
 from ..templating import template
+from .exported import Exported
 from .options import Options
 from .records import Form, P, record_scalars
 from .shader import DATA_WIDTH
@@ -30,9 +31,9 @@ from .tiles import COARSEST
 FORM = Form(tuple(KINDS), unions=True)
 
 
-def component(scene: Scene, options: Options) -> str:
+def component(scene: Scene, options: Options) -> Exported:
     """An ES module that defines the element; it is the same for every scene."""
-    return template("component.js.jinja").render(
+    text = template("component.js.jinja").render(
         format=FORMAT,
         version=VERSION,
         coarsest=COARSEST,
@@ -44,6 +45,7 @@ def component(scene: Scene, options: Options) -> str:
         **_shader_parts(),
         width=DATA_WIDTH,
     )
+    return Exported(text)
 
 
 def _formulas() -> Iterable[str]:

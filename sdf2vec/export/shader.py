@@ -32,6 +32,7 @@ from ..shapes import KINDS
 from ..templating import template
 from . import packing
 from .constants import constants
+from .exported import Exported
 from .layouts import (
     EMBEDDED,
     FILE,
@@ -98,7 +99,13 @@ class Shader:
         return line
 
 
-@lru_cache(maxsize=16)
+def exported(scene: Scene, options: Options, name: str, suffix: str) -> Exported:
+    """A scene as a shader, with its data beside it. Raises Sdf2vecError for a layout that the target can't hold."""
+    made = shader(scene, name, options)
+    beside = {} if TARGETS[name].host is EMBEDDED else files_beside(made, suffix)
+    return Exported(made.text, beside, (made.about,), made.error)
+
+
 def shader(scene: Scene, name: str, options: Options) -> Shader:
     """A scene as a shader: `name` is a key of TARGETS. Raises Sdf2vecError for a layout that the target can't hold."""
     target = TARGETS[name]

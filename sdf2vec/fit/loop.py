@@ -24,7 +24,8 @@ from .growth import exchange, importance, least, newcomers
 from .losses import Objective, objective
 from .placing import Layers, background_of, empty_groups, place
 from .presets import CROWDED, CROWDING, LENGTHS, MANY, RATES, Phase, Start
-from .settings import Settings, preset_of, weights_for
+from .settings import Settings, preset_of
+from .weights import weights_for
 
 WIDEN_EVERY = 10  # steps
 AREA_WEIGHT = 1.0  # of the area constraint in the loss
@@ -241,7 +242,9 @@ class Fit:
         from .palette import found, snap  # loads scipy, which most fits don't need
 
         cover = importance(self._draw(self.tensors, stage.target), self.tensors, self.generator)
-        palette = self.settings.palette or found(self.tensors, cover, self.settings.colors, self.generator)
+        palette = self.settings.palette or found(
+            self.tensors, cover, self.settings.colors or 0, self.generator
+        )
         snap(self.tensors, list(palette))
 
     def _refit(self, stage: Stage) -> None:
@@ -275,7 +278,7 @@ class Fit:
 
 
 def _layers_of(settings: Settings) -> Layers:
-    return Layers(settings.kinds, settings.compositing, settings.union)
+    return Layers(settings.kind, settings.compositing, settings.union)
 
 
 def _shape_count(tensors: SceneTensors) -> int:
