@@ -68,7 +68,7 @@ class RoundTrip:
 
     target: str
     engine: str
-    draw: Callable[[RoundTrip, Exported, Scene, int, int], Pixels]
+    how: Callable[[RoundTrip, Exported, Scene, int, int], Pixels]
     any_shape: bool = True
     profile: str | None = None
 
@@ -79,6 +79,10 @@ class RoundTrip:
     @property
     def options(self) -> Options:
         return Options(svg_profile=self.profile or SVG_PROFILES[0])
+
+    def draw(self, made: Exported, scene: Scene, width: int, height: int) -> Pixels:
+        """The export, premultiplied."""
+        return self.how(self, made, scene, width, height)
 
     def drawn(self, content: Any, width: int, height: int, **more: Any) -> Pixels:
         """What the engine draws of it."""
@@ -160,7 +164,7 @@ def compare(
 ) -> Check:
     """One export drawn at one size, against a render [4, H, W], by default `_expected`."""
     width, height = size
-    drawn = trip.draw(trip, made, scene, width, height)
+    drawn = trip.draw(made, scene, width, height)
     if expected is None:
         expected = _expected(scene, width, height)
     difference = 255.0 * (drawn.astype(np.float64) - expected.permute(1, 2, 0).double().numpy())
@@ -193,6 +197,11 @@ def _shader(trip: RoundTrip, made: Exported, scene: Scene, width: int, height: i
 def _shadertoy(trip: RoundTrip, made: Exported, scene: Scene, width: int, height: int) -> Pixels:
     text = f"{SHADERTOY_HEAD}{made.data!s}{SHADERTOY_TAIL}"
     return trip.drawn(text, width, height, uniforms={"iResolution": (width, height, 1.0)})
+
+
+def _pasted(trip: RoundTrip, made: Exported, scene: Scene, width: int, height: int) -> Pixels:
+    """By a client that puts around it what Shadertoy does."""
+    return trip.drawn(made.data, width, height)
 
 
 def _godot(trip: RoundTrip, made: Exported, scene: Scene, width: int, height: int) -> Pixels:
@@ -247,7 +256,7 @@ ROUND_TRIPS: dict[str, tuple[RoundTrip, ...]] = {
     "glsl": (RoundTrip("glsl", "opengl", _shader),),
     "shadertoy": (
         RoundTrip("shadertoy", "opengl", _shadertoy),
-        RoundTrip("shadertoy", "shadertoy", _whole),
+        RoundTrip("shadertoy", "shadertoy", _pasted),
     ),
     "wgsl": (RoundTrip("wgsl", "webgpu", _shader),),
     "three": (RoundTrip("three", "three", _whole, False),),

@@ -19,7 +19,7 @@ import pytest
 from PIL import Image
 
 import sdf2vec
-from sdf2vec import Layer, Scene, Shape
+from sdf2vec import Layer, Scene, Shape, quality
 from sdf2vec.cli import main
 from sdf2vec.engines import ENGINES
 from sdf2vec.fit import loop
@@ -126,7 +126,7 @@ def test_the_summary_names_the_quality_and_every_file(folder, run):
 
 
 def test_the_summary_says_at_which_size_flip_was_computed(folder, run, monkeypatch):
-    monkeypatch.setattr(sdf2vec.api, "FLIP_RESOLUTION", 10)
+    monkeypatch.setattr(quality, "FLIP_RESOLUTION", 10)
     line = run("photo.jpg", *SHORT, "--emit", "json").out.decode().splitlines()[0]
     assert re.search(r"dB, FLIP 0\.\d{4} at 12 x 8, ", line)
 
@@ -527,8 +527,8 @@ def test_options_reach_the_exporter(folder, run, scene_file):
     run("export", scene_file, "--emit", "glsl", "--glsl", "330", "--layout", "table", "-o", "a.glsl")
     text = (folder / "a.glsl").read_text()
     assert text.startswith("#version 330\n")
-    assert text == scene.to("glsl", glsl="330", layout="table", title="photo")
-    assert text != scene.to("glsl", glsl="330", layout="readable", title="photo")
+    assert text == sdf2vec.export(scene, "glsl", glsl="330", layout="table", title="photo")
+    assert text != sdf2vec.export(scene, "glsl", glsl="330", layout="readable", title="photo")
 
 
 def test_check_prints_a_table(folder, run, scene_file, require_engine):
@@ -553,7 +553,7 @@ def test_check_says_what_differs(folder, run, scene_file, monkeypatch, require_e
     def white(text, width, height, uniforms, texture):
         return np.ones((height, width, 4), np.float32)
 
-    monkeypatch.setitem(ENGINES, "opengl", replace(ENGINES["opengl"], render=white))
+    monkeypatch.setitem(ENGINES, "opengl", replace(ENGINES["opengl"], draw=white))
     outcome = run("check", scene_file, "--emit", "glsl")
     assert outcome.code == 1
     assert [line.split()[-1] for line in outcome.out.decode().splitlines()[1:]] == ["differs"] * 3

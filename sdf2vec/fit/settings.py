@@ -35,11 +35,17 @@ Union = Annotated[
     int, number("number of shapes joined (union)", "K", 1, MAX_UNION, "join K shapes smoothly in each layer")
 ]
 MinArea = Annotated[
-    float, number("least area, a share of the canvas,", "SHARE", 0, LARGEST_AREA, "least area, of the canvas")
+    float, number("least area (share of the canvas)", "SHARE", 0, LARGEST_AREA, "least area, of the canvas")
 ]
 MaxFalloff = Annotated[
     float,
-    number("largest falloff", "SHARE", 0, SOFTEST, "softest edge, of the shortest side: 0 for sharp shapes"),
+    number(
+        "largest falloff (share of the shortest side)",
+        "SHARE",
+        0,
+        SOFTEST,
+        "softest edge, of the shortest side: 0 for sharp shapes",
+    ),
 ]
 Trials = Annotated[
     int, number("number of trials", "T", 0, 10_000, "try a few shapes elsewhere at the end, T times")
