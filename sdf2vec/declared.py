@@ -150,5 +150,5 @@ def documented(record: type[msgspec.Struct]) -> Callable[[Function], Function]:
 
 def check_choice(what: str, value: Any, known: Collection[str]) -> None:
     """Raises Sdf2vecError for an unknown name."""
-    if value not in known:
+    if value not in list(known):
         raise Sdf2vecError(f"unknown {what} {value!r}; choose from {', '.join(known)}")
