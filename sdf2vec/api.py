@@ -32,7 +32,7 @@ def fit(
     image: Any,
     shapes: int | None = None,
     *,
-    callback: Callable[[Progress], bool] = lambda progress: False,
+    callback: Callable[[Progress], bool] | None = None,
     **options: Any,
 ) -> Scene:
     """Fits `shapes` shapes to a picture.
@@ -43,7 +43,7 @@ def fit(
     weight. Raises Sdf2vecError for anything that can't be fitted.
     """
     settings = settings_of(shapes, **options)
-    return _fit_picture(_load_picture(image), settings, callback)
+    return _fit_picture(_load_picture(image), settings, callback or (lambda progress: False))
 
 
 def render(scene: Scene, width: int | None = None, height: int | None = None) -> NDArray[np.float32]:
