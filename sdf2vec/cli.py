@@ -4,35 +4,49 @@ from __future__ import annotations
 
 import argparse
 import gzip
-import inspect
 import signal
 import sys
 import time
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 from types import FrameType
 from typing import TYPE_CHECKING, Any, BinaryIO, Literal, NoReturn
 
+from msgspec.structs import replace
+
 from . import __version__, api
-from .blend import FRAMINGS
+from .declared import add_flags, check_choice, checked, chosen, options_of
+from .deferred import deferred
 from .errors import Sdf2vecError
-from .export import EXPORTERS, beside, export
-from .export.options import GLSL_VERSIONS, LAYOUTS, SVG_PROFILES, Options
+from .export import EXPORTERS
+from .export.exported import Exported
+from .export.options import Options
+from .exports import Exports
 from .files import one_line, require_writable, write_atomically
-from .fit.presets import DEFAULT, PRESETS
-from .fit.settings import DEVICES, LOSS_NAMES, settings_of
-from .image import Picture, encode_png, load
+from .fit.settings import Settings, settings_of
 from .scene import Scene
 from .scene import load as load_scene
 from .scene import loads as loads_scene
-from .shapes import KINDS
 
 if TYPE_CHECKING:
     from .fit.loop import Progress
+    from .image import Picture
+    from .quality import Quality
     from .roundtrip import Check
 
+load_picture: Callable[[Any], Picture] = deferred("sdf2vec.image", "load")
+encode_png: Callable[[Any], bytes] = deferred("sdf2vec.image", "encode_png")
+quality_of: Callable[[Scene, Picture], Quality] = deferred("sdf2vec.quality", "quality")
+figure: Callable[..., Check | None] = deferred("sdf2vec.roundtrip", "figure")
+Console, Table = deferred("rich.console", "Console"), deferred("rich.table", "Table")
+escape: Callable[[str], str] = deferred("rich.markup", "escape")
+Bar, BarColumn = deferred("rich.progress", "Progress"), deferred("rich.progress", "BarColumn")
+TextColumn = deferred("rich.progress", "TextColumn")
+TimeRemainingColumn = deferred("rich.progress", "TimeRemainingColumn")
+
+SET_HERE = ("title", "alone", "original")  # options of exports that have no flag
 STREAM = "-"
 OK, FAILED, INTERRUPTED = 0, 2, 130
 
@@ -83,62 +97,14 @@ def _convert_parser() -> argparse.ArgumentParser:
     parser.add_argument("inputs", nargs="+", metavar="INPUT", help="pictures; - reads standard input")
     _add_emit(parser, "glsl")
     _add_output(parser)
-    _add_settings(parser.add_argument_group("fit"))
-    _add_options(parser)
+    add_flags(parser.add_argument_group("fit"), Settings)
+    add_flags(parser.add_argument_group("export"), Options, SET_HERE)
     parser.add_argument(
         "--with-original", action="store_true", help="a page also holds the picture and a slider to compare"
     )
     parser.add_argument("--quiet", action="store_true", help="print errors only")
     parser.add_argument("--version", action="version", version=f"sdf2vec {__version__}")
     return parser
-
-
-def _add_settings(group: argparse._ArgumentGroup) -> None:
-    """The options of a fit; their names are those of `api.fit`."""
-    group.add_argument(
-        "--shapes", type=int, metavar="N", help="how many shapes (default: 256, or as many as --start has)"
-    )
-    group.add_argument(
-        "--kind",
-        default="triangle",
-        metavar="KIND",
-        help=f"{', '.join(KINDS)}, mixed, or several: box,circle (default: triangle)",
-    )
-    group.add_argument(
-        "--union", type=int, default=1, metavar="K", help="join K shapes smoothly in each layer"
-    )
-    group.add_argument("--compositing", help="over or additive (default: over)")
-    group.add_argument("--preset", default=DEFAULT, help=f"{', '.join(PRESETS)} (default: {DEFAULT})")
-    group.add_argument(
-        "--loss",
-        metavar="LOSS",
-        help=f"{', '.join(LOSS_NAMES)}, or several with weights: l1:0.8,ssim:0.2 (default: the preset's)",
-    )
-    group.add_argument("--seed", type=int, default=0, help="the same seed gives the same scene (default: 0)")
-    group.add_argument(
-        "--device", default="auto", choices=DEVICES, help="where to fit (default: auto, CUDA if it works)"
-    )
-    group.add_argument("--weights", metavar="MASK", help="a picture that is bright where errors matter")
-    group.add_argument("--start", metavar="SCENE", help="a scene file to go on from, at any size")
-    group.add_argument("--palette", metavar="COLORS", help='the only colours there may be: "#123,#a0b1c2"')
-    group.add_argument("--colors", type=int, metavar="K", help="how many colours there may be")
-    group.add_argument("--min-area", type=float, metavar="SHARE", help="least area of a shape, of the canvas")
-    group.add_argument(
-        "--max-falloff",
-        type=float,
-        metavar="SHARE",
-        help="softest edge, of the shortest side: 0 for sharp shapes",
-    )
-    group.add_argument(
-        "--trials", type=int, default=0, metavar="T", help="try a few shapes elsewhere at the end, T times"
-    )
-
-
-SETTINGS = tuple(inspect.signature(settings_of).parameters)[1:]
-
-
-def _settings(options: argparse.Namespace) -> dict[str, Any]:
-    return {name: getattr(options, name) for name in SETTINGS} | {"kind": _kinds(options)}
 
 
 def _add_emit(parser: argparse.ArgumentParser, default: str) -> None:
@@ -161,30 +127,9 @@ def _add_output(parser: argparse.ArgumentParser) -> None:
     )
 
 
-def _add_options(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument("--size", type=int, metavar="PIXELS", help="shortest side of a PNG")
-    parser.add_argument("--glsl", default="es300", help=f"GLSL version: {', '.join(GLSL_VERSIONS)}")
-    parser.add_argument("--layout", default="auto", help=f"how shaders hold shapes: {', '.join(LAYOUTS)}")
-    parser.add_argument(
-        "--framing", default="fit", help=f"on a canvas of another shape, shaders: {', '.join(FRAMINGS)}"
-    )
-    parser.add_argument("--animate", action="store_true", help="the shapes of a Shadertoy breathe")
-    parser.add_argument(
-        "--svg-profile",
-        default=SVG_PROFILES[0],
-        help=f"{' or '.join(SVG_PROFILES)}: with blur filters (default), or without, for every renderer",
-    )
-    parser.add_argument(
-        "--svg-size-limit", type=int, metavar="BYTES", help="draw an SVG coarser where it would be larger"
-    )
-
-
-def _export_options(options: argparse.Namespace) -> Options:
+def _export_options(namespace: argparse.Namespace) -> Options:
     """What the user chose about exports. Raises Sdf2vecError for impossible choices."""
-    return Options(**{name: getattr(options, name) for name in EXPORT_OPTIONS if hasattr(options, name)})
-
-
-EXPORT_OPTIONS = ("size", "glsl", "layout", "framing", "animate", "svg_profile", "svg_size_limit")
+    return checked(Options, chosen(namespace, Options))
 
 
 @dataclass(frozen=True)
@@ -201,7 +146,8 @@ def _convert(arguments: list[str]) -> int:
         parser.error("no picture given")
     options = parser.parse_intermixed_args(arguments)
     targets = _targets(options.emit, "glsl")
-    also_read = [path for path in (options.start, options.weights) if path is not None]
+    given = chosen(options, Settings)
+    also_read = [given[name] for name in ("start", "weights") if name in given]
     jobs = _plan(options.inputs, targets, options.output, also_read)
     _check_settings(options, targets)
     status = OK
@@ -219,14 +165,10 @@ def _convert(arguments: list[str]) -> int:
 
 def _check_settings(options: argparse.Namespace, targets: list[str]) -> None:
     """Refuses impossible settings, and targets that can't hold such a scene, before any work is done."""
-    compositing = settings_of(options.shapes, **_settings(options)).compositing
-    chosen = _export_options(options)
+    compositing = settings_of(**chosen(options, Settings)).compositing
+    exports = Exports(Scene(1, 1, (), compositing=compositing))
     for target in targets:
-        api.check_export(Scene(1, 1, (), compositing=compositing), target, chosen)
-
-
-def _kinds(options: argparse.Namespace) -> list[str]:
-    return [name.strip() for name in options.kind.split(",") if name.strip()]
+        exports.export(target, replace(_export_options(options), svg_size_limit=None))
 
 
 def _convert_one(job: _Job, options: argparse.Namespace) -> bool:
@@ -239,7 +181,7 @@ def _convert_one(job: _Job, options: argparse.Namespace) -> bool:
     with _stopping() as stop:
         scene = _fit(picture, options, stop)
         seconds = time.perf_counter() - started
-        quality = _quality(scene, picture)
+        quality = _described(scene, picture)
         early = ", stopped early" if stop.requested else ""
         size = f"{picture.width} x {picture.height}"
         say(f"{_name(job.source)}: {size}, {scene.shape_count} shapes, {quality}, {seconds:.1f} s{early}")
@@ -248,8 +190,8 @@ def _convert_one(job: _Job, options: argparse.Namespace) -> bool:
         return stop.requested
 
 
-def _quality(scene: Scene, picture: Picture) -> str:
-    psnr, flip, (width, height) = api.quality(scene, picture)
+def _described(scene: Scene, picture: Picture) -> str:
+    psnr, flip, (width, height) = quality_of(scene, picture)
     where = "" if (width, height) == (picture.width, picture.height) else f" at {width} x {height}"
     return f"PSNR {psnr:.2f} dB, FLIP {flip:.4f}{where}"
 
@@ -261,13 +203,13 @@ def _fit(picture: Picture, options: argparse.Namespace, stop: _Stop) -> Scene:
             report(progress)
             return stop.requested
 
-        return api.fit(picture, options.shapes, callback=callback, **_settings(options))
+        return api.fit(picture, callback=callback, **chosen(options, Settings))
 
 
 def _read_picture(source: str) -> Picture:
     if source != STREAM:
-        return load(source)
-    return load(_standard_input())
+        return load_picture(source)
+    return load_picture(_standard_input())
 
 
 def _standard_input() -> BinaryIO:
@@ -288,23 +230,22 @@ def _write_exports(
     original: bytes | None = None,
 ) -> None:
     title = "a picture" if job.source == STREAM else one_line(_stem(job.source))
-    chosen = _export_options(options)
+    plain, exports = _export_options(options), Exports(scene)
     for target, path in job.outputs.items():
-        made = replace(chosen, title=title, alone=path == STREAM, original=original)
-        data = export(scene, target, made)
-        raw = data.encode() if isinstance(data, str) else data
-        _write(path, raw)
+        chosen = replace(plain, title=title, alone=path == STREAM, original=original)
+        made = exports.export(target, chosen)
+        _write(path, made.raw)
         if path != STREAM:
-            say(f"  {path}: {len(raw):,} bytes{_packed(target, raw)}{_figure(scene, target, data, made)}")
-            _write_beside(path, scene, target, made, say)
-        for note in EXPORTERS[target].notes(scene, made):
+            near = _figure(scene, target, made, chosen)
+            say(f"  {path}: {len(made.raw):,} bytes{_packed(target, made.raw)}{near}")
+            _write_beside(path, EXPORTERS[target].suffix, made.beside, say)
+        for note in made.notes:
             say(f"  {note}")
 
 
-def _write_beside(path: str, scene: Scene, target: str, made: Options, say: Callable[[str], None]) -> None:
+def _write_beside(path: str, suffix: str, files: Mapping[str, bytes], say: Callable[[str], None]) -> None:
     """Files that belong to an export, named after it."""
-    suffix = EXPORTERS[target].suffix
-    for ending, data in beside(scene, target, made).items():
+    for ending, data in files.items():
         place = path.removesuffix(suffix) + ending if path.endswith(suffix) else path + ending[len(suffix) :]
         write_atomically(place, data)
         say(f"  {place}: {len(data):,} bytes")
@@ -323,12 +264,10 @@ def _write(path: str, data: bytes) -> None:
         write_atomically(path, data)
 
 
-def _figure(scene: Scene, target: str, data: str | bytes, options: Options) -> str:
+def _figure(scene: Scene, target: str, made: Exported, options: Options) -> str:
     """How near the export comes to the render, where an engine can tell; at the fitted size."""
-    from .roundtrip import figure
-
     try:
-        result = figure(scene, target, data, options)
+        result = figure(scene, target, made, options)
     except Sdf2vecError as error:
         return f"; not checked: {one_line(str(error))}"
     if result is None:
@@ -346,7 +285,8 @@ def _targets(emit: list[str] | None, default: str) -> list[str]:
     targets = list(dict.fromkeys(name for name in names if name))
     if not targets:
         raise Sdf2vecError(f"--emit names nothing; choose from {', '.join(EXPORTERS)}")
-    api.check_targets(targets)
+    for target in targets:
+        check_choice("target", target, EXPORTERS)
     return targets
 
 
@@ -429,10 +369,6 @@ def _progress(quiet: bool) -> Iterator[Callable[[Progress], None]]:
     if quiet or not sys.stderr.isatty():
         yield lambda progress: None
         return
-    from rich.console import Console
-    from rich.progress import BarColumn, TextColumn, TimeRemainingColumn
-    from rich.progress import Progress as Bar
-
     columns = (
         TextColumn("{task.description:>7}"),
         BarColumn(),
@@ -480,7 +416,7 @@ def _read_scene(source: str) -> Scene:
 def _render_command(arguments: list[str]) -> int:
     parser = _Parser(prog="sdf2vec render", description="Renders a scene file as PNG.")
     parser.add_argument("scene", help="a .scene.json file; - reads standard input")
-    parser.add_argument("--size", type=int, metavar="PIXELS", help="shortest side (default: as fitted)")
+    options_of(Options)["size"].add_flag(parser)
     _add_output(parser)
     return _write_scene_exports(parser, parser.parse_args(arguments), ["png"])
 
@@ -490,7 +426,7 @@ def _export_command(arguments: list[str]) -> int:
     parser.add_argument("scene", help="a .scene.json file; - reads standard input")
     _add_emit(parser, "glsl")
     _add_output(parser)
-    _add_options(parser)
+    add_flags(parser, Options, SET_HERE)
     options = parser.parse_args(arguments)
     return _write_scene_exports(parser, options, _targets(options.emit, "glsl"))
 
@@ -522,10 +458,6 @@ def _check_command(arguments: list[str]) -> int:
 
 
 def _print_table(results: list[Check]) -> None:
-    from rich.console import Console
-    from rich.markup import escape
-    from rich.table import Table
-
     table = Table(box=None, pad_edge=False)
     for name, justify in TABLE_COLUMNS.items():
         table.add_column(name, justify=justify)

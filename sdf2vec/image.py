@@ -18,7 +18,7 @@ from typing import Any, BinaryIO
 
 import numpy as np
 from numpy.typing import NDArray
-from PIL import Image, ImageChops, ImageCms
+from PIL import Image, ImageChops, ImageCms, ImageOps
 
 from sdf2vec.errors import Sdf2vecError
 from sdf2vec.files import one_line
@@ -34,18 +34,6 @@ _READABLE = "PNG, JPEG, WebP, AVIF, TIFF, GIF, BMP"
 
 _FULL_SCALE = {"bool": 1, "uint8": 255, "uint16": 65535}
 _RANGE_SLACK = 0.01  # resampling overshoots 0..1 by a little; more than this is another scale
-
-_ORIENTATION_TAG = 0x0112
-# EXIF 2.32, 4.6.4.A "Orientation": what turns the stored picture upright. 1 is upright already.
-_UPRIGHT = {
-    2: Image.Transpose.FLIP_LEFT_RIGHT,
-    3: Image.Transpose.ROTATE_180,
-    4: Image.Transpose.FLIP_TOP_BOTTOM,
-    5: Image.Transpose.TRANSPOSE,
-    6: Image.Transpose.ROTATE_270,
-    7: Image.Transpose.TRANSVERSE,
-    8: Image.Transpose.ROTATE_90,
-}
 
 _COLOUR_MODES = {"1": "L", "L": "L", "LA": "L", "CMYK": "CMYK", "I": "I", "F": "F"}  # any other mode: RGB
 _STRAIGHT_MODES = {"La": "LA", "RGBa": "RGBA"}  # Pillow's premultiplied modes
@@ -77,7 +65,7 @@ class Picture:
 
 @functools.singledispatch
 def load(source: Any) -> Picture:
-    """Read a picture from a path, bytes, a binary file, a Pillow image or a numpy array.
+    """Read a picture from a path, bytes, a binary file, a Pillow image or a numpy array; a Picture stays what it is.
 
     Files: PNG, JPEG, WebP, AVIF, TIFF, GIF, BMP, of any colour model and depth that Pillow reads. The first
     frame counts, EXIF orientation is applied, an embedded ICC profile is converted to sRGB (8 bits a channel;
@@ -101,6 +89,11 @@ def load(source: Any) -> Picture:
     except OSError as error:
         raise Sdf2vecError(f"{name}: cannot be read ({error.strerror or error})") from error
     return _load_stream(stream, name)
+
+
+@load.register(Picture)
+def _(source: Picture) -> Picture:
+    return source
 
 
 @load.register(bytes)
@@ -223,10 +216,9 @@ def _decoded(image: Image.Image, name: str) -> Image.Image:
 
 def _upright(image: Image.Image) -> Image.Image:
     try:
-        turn = _UPRIGHT.get(image.getexif().get(_ORIENTATION_TAG, 1))
+        return ImageOps.exif_transpose(image)
     except Exception:  # damaged EXIF data says nothing about the pixels
         return image
-    return image if turn is None else image.transpose(turn)
 
 
 def _frame_notes(image: Image.Image) -> tuple[str, ...]:

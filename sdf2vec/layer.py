@@ -17,7 +17,21 @@ from functools import cached_property
 from typing import NamedTuple
 
 from .blend import COMPOSITING, JOINS, coverage, reach, saturation, union_reach
-from .expr import VEC2, VECTOR, Expr, Operand, const, let, maximum, minimum, operation, scalarize, var, vec3, vec4
+from .expr import (
+    VEC2,
+    VECTOR,
+    Expr,
+    Operand,
+    const,
+    let,
+    maximum,
+    minimum,
+    operation,
+    scalarize,
+    var,
+    vec3,
+    vec4,
+)
 from .paints import FLAT, PAINTS, Paint
 from .shapes import KINDS, Kind
 from .units import FALLOFF, OPACITY, SMOOTHNESS, Parameter

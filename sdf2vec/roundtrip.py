@@ -2,25 +2,28 @@
 
 from __future__ import annotations
 
+import base64
 import math
+import re
 from collections.abc import Callable, Iterable, Sequence
-from dataclasses import dataclass, field
-from functools import lru_cache
-from typing import TYPE_CHECKING
+from dataclasses import dataclass
+from functools import cache, partial
+from typing import Any
 
 import numpy as np
+import torch
 from numpy.typing import NDArray
 
-from .engines import ENGINES, EngineError
+from .engines import ENGINES
 from .errors import Sdf2vecError
-from .export import export
+from .export.exported import Exported
 from .export.options import SVG_PROFILES, Options
-from .export.shader import TARGETS, shader
+from .export.shader import DATA_WIDTH
+from .exports import Exports
 from .image import fitted_size, premultiply
-from .scene import Scene
-
-if TYPE_CHECKING:
-    from torch import Tensor
+from .render.draw import draw, draw_fast, is_large
+from .render.reference import render
+from .scene import Scene, dumps
 
 Pixels = NDArray[np.float32]  # [height, width, 4] premultiplied RGBA
 Size = tuple[int, int]
@@ -57,22 +60,34 @@ class Check:
 
 @dataclass(frozen=True)
 class RoundTrip:
-    """How a target is drawn: on which engine, with what around the text, exported with which options.
+    """How a target is drawn: on which engine, a key of ENGINES, and with what around the export.
 
-    A shader fills a canvas of any shape; a drawing (`any_shape=False`) ends at the edges of its picture.
-    `note` tells apart what one engine draws of one target.
+    A shader fills a canvas of any shape; a drawing (`any_shape=False`) ends at the edges of its picture. `profile`:
+    that of the SVG, where there is one.
     """
 
     target: str
     engine: str
-    draw: Callable[[str, int, int, Pixels | None], Pixels]
+    how: Callable[[RoundTrip, Exported, Scene, int, int], Pixels]
     any_shape: bool = True
-    options: Options = field(default_factory=Options)
-    note: str = ""
+    profile: str | None = None
 
     @property
     def name(self) -> str:
-        return f"{self.target} {self.note}".strip()
+        return self.target if self.profile in (None, SVG_PROFILES[0]) else f"{self.target} {self.profile}"
+
+    @property
+    def options(self) -> Options:
+        return Options(svg_profile=self.profile or SVG_PROFILES[0])
+
+    def draw(self, made: Exported, scene: Scene, width: int, height: int) -> Pixels:
+        """The export, premultiplied."""
+        return self.how(self, made, scene, width, height)
+
+    def drawn(self, content: Any, width: int, height: int, **more: Any) -> Pixels:
+        """What the engine draws of it."""
+        pixels: Pixels = ENGINES[self.engine].render(content, width, height, **more)
+        return pixels
 
 
 def check(
@@ -89,9 +104,21 @@ def check(
     trips = [trip for name, several in ROUND_TRIPS.items() if name in chosen for trip in several]
     if not trips:
         raise Sdf2vecError(f"nothing to check: engines draw {', '.join(ROUND_TRIPS)}")
-    return [
-        result for trip in trips for result in _check_trip(scene, trip, sizes or default_sizes(scene, trip))
-    ]
+    export, expected = cache(Exports(scene).export), cache(partial(_expected, scene))
+
+    def check_trip(trip: RoundTrip) -> list[Check]:
+        engine = ENGINES[trip.engine]
+        reason = engine.missing()
+        if reason:
+            return [Check(trip.name, engine.name, missing=reason)]
+        try:
+            made = export(trip.target, trip.options)
+        except Sdf2vecError as error:
+            return [Check(trip.name, engine.name, missing=str(error))]
+        drawn_at = sizes or default_sizes(scene, trip)
+        return [compare(trip, made, scene, size, expected(*size)) for size in drawn_at]
+
+    return [result for trip in trips for result in check_trip(trip)]
 
 
 def default_sizes(scene: Scene, trip: RoundTrip) -> list[Size]:
@@ -110,79 +137,41 @@ def _small(width: int, height: int) -> Size:
     return width // common * min(times, common), height // common * min(times, common)
 
 
-@lru_cache(maxsize=4)
-def _expected(scene: Scene, width: int, height: int) -> Tensor:
+def _expected(scene: Scene, width: int, height: int) -> torch.Tensor:
     """The reference in float64; for large jobs, which would take it minutes, the fused renderer."""
-    import torch
-
-    from .render.draw import draw, is_large
-    from .render.reference import render
-
     if is_large(scene, width, height):
         return draw(scene, width, height)
     return render(scene, width, height, dtype=torch.float64)
 
 
-def _check_trip(scene: Scene, trip: RoundTrip, sizes: Sequence[Size]) -> list[Check]:
-    reason = ENGINES[trip.engine].missing()
-    if reason:
-        return [Check(trip.name, trip.engine, missing=reason)]
-    try:
-        text, data = _exported(scene, trip.target, trip.options)
-        return [compare(trip, text, scene, size, data) for size in sizes]
-    except EngineError:
-        raise
-    except Sdf2vecError as error:
-        return [Check(trip.name, trip.engine, missing=str(error))]
-
-
-def figure(scene: Scene, target: str, data: str | bytes, options: Options) -> Check | None:
-    """An export at the fitted size on the first engine that draws it; None where none is here.
+def figure(scene: Scene, target: str, made: Exported, options: Options) -> Check | None:
+    """An export at the fitted size on the first quick engine that draws it; None where none is here.
 
     None too for one that shows something else than the render: a moving or a cropped picture.
     """
-    if options.animate or options.framing != "fit" or not isinstance(data, str):
+    if options.animate or options.framing != "fit":
         return None
     for trip in ROUND_TRIPS.get(target, ()):
-        suits = trip.target != "svg" or trip.options.svg_profile == options.svg_profile
-        if suits and not ENGINES[trip.engine].missing():
-            beside = _exported(scene, target, options)[1] if target in TARGETS else None
-            width, height = default_sizes(scene, trip)[0]
-            from .render.draw import draw_fast
-
-            expected = draw_fast(scene, width, height)
-            return compare(trip, data, scene, (width, height), beside, expected)
+        engine, suits = ENGINES[trip.engine], trip.profile in (None, options.svg_profile)
+        if suits and engine.is_quick and not engine.missing():
+            size = default_sizes(scene, trip)[0]
+            return compare(trip, made, scene, size, draw_fast(scene, *size))
     return None
 
 
-def _exported(scene: Scene, target: str, options: Options) -> tuple[str, Pixels | None]:
-    """An export's text, and the data beside it."""
-    if target in TARGETS:
-        made = shader(scene, target, options)
-        return made.text, made.data
-    text = export(scene, target, options)
-    assert isinstance(text, str)
-    return text, None
-
-
 def compare(
-    trip: RoundTrip,
-    text: str,
-    scene: Scene,
-    size: Size,
-    data: Pixels | None = None,
-    expected: Tensor | None = None,
+    trip: RoundTrip, made: Exported, scene: Scene, size: Size, expected: torch.Tensor | None = None
 ) -> Check:
-    """One export (and the data beside it) drawn at one size, against a render [4, H, W], by default `_expected`."""
+    """One export drawn at one size, against a render [4, H, W], by default `_expected`."""
     width, height = size
-    drawn = trip.draw(text, width, height, data)
+    drawn = trip.draw(made, scene, width, height)
     if expected is None:
         expected = _expected(scene, width, height)
     difference = 255.0 * (drawn.astype(np.float64) - expected.permute(1, 2, 0).double().numpy())
     error = float(np.mean(difference**2))
     return Check(
         trip.name,
-        trip.engine,
+        ENGINES[trip.engine].name,
         width,
         height,
         psnr=10.0 * math.log10(255.0**2 / error) if error > 0 else math.inf,
@@ -194,29 +183,50 @@ def compare(
 # --- drawing -----------------------------------------------------------------------------------------------
 
 
-def _draw_glsl(text: str, width: int, height: int, data: Pixels | None) -> Pixels:
-    uniforms = {"resolution": (width, height)}
-    return ENGINES["opengl"].render(text, width, height, uniforms=uniforms, texture=data)
+def _data(made: Exported) -> Pixels | None:
+    """The data beside a shader, [rows, DATA_WIDTH, 4]."""
+    raw = [data for name, data in made.beside.items() if name.endswith(".bin")]
+    return np.frombuffer(raw[0], "<f4").reshape(-1, DATA_WIDTH, 4) if raw else None
 
 
-def _draw_shadertoy(text: str, width: int, height: int, data: Pixels | None) -> Pixels:
-    whole = SHADERTOY_HEAD + text + SHADERTOY_TAIL
-    return ENGINES["opengl"].render(whole, width, height, uniforms={"iResolution": (width, height, 1.0)})
+def _shader(trip: RoundTrip, made: Exported, scene: Scene, width: int, height: int) -> Pixels:
+    """A shader that is told the canvas."""
+    return trip.drawn(made.data, width, height, uniforms={"resolution": (width, height)}, texture=_data(made))
 
 
-def _draw_wgsl(text: str, width: int, height: int, data: Pixels | None) -> Pixels:
-    uniforms = {"resolution": (width, height)}
-    return ENGINES["webgpu"].render(text, width, height, uniforms=uniforms, texture=data)
+def _shadertoy(trip: RoundTrip, made: Exported, scene: Scene, width: int, height: int) -> Pixels:
+    text = f"{SHADERTOY_HEAD}{made.data!s}{SHADERTOY_TAIL}"
+    return trip.drawn(text, width, height, uniforms={"iResolution": (width, height, 1.0)})
 
 
-def _drawing(engine: str, profile: str) -> RoundTrip:
-    """An SVG of one profile on one engine."""
+def _pasted(trip: RoundTrip, made: Exported, scene: Scene, width: int, height: int) -> Pixels:
+    """By a client that puts around it what Shadertoy does."""
+    return trip.drawn(made.data, width, height)
 
-    def draw(text: str, width: int, height: int, data: Pixels | None) -> Pixels:
-        return premultiply(ENGINES[engine].render(text, width, height))
 
-    note = profile if profile != SVG_PROFILES[0] else ""
-    return RoundTrip("svg", engine, draw, False, Options(svg_profile=profile), note)
+def _godot(trip: RoundTrip, made: Exported, scene: Scene, width: int, height: int) -> Pixels:
+    """As plain GLSL: Godot's own compiler can't be had."""
+    text = GODOT_HEAD + GODOT_MODES.sub("", str(made.data))
+    return trip.drawn(text, width, height, uniforms={"resolution": (width, height)})
+
+
+def _whole(trip: RoundTrip, made: Exported, scene: Scene, width: int, height: int) -> Pixels:
+    """What the engine takes as it is, and draws with straight alpha."""
+    return premultiply(trip.drawn(made.data, width, height))
+
+
+def _element(trip: RoundTrip, made: Exported, scene: Scene, width: int, height: int) -> Pixels:
+    return premultiply(trip.drawn(made.data, width, height, scene=dumps(scene)))
+
+
+def _decoded(trip: RoundTrip, made: Exported, scene: Scene, width: int, height: int) -> Pixels:
+    """The drawing that an address holds."""
+    text = base64.b64decode(str(made.data).partition(",")[2]).decode()
+    return premultiply(trip.drawn(text, width, height))
+
+
+def _svg(target: str, profile: str, *engines: str) -> tuple[RoundTrip, ...]:
+    return tuple(RoundTrip(target, engine, _whole, False, profile) for engine in engines)
 
 
 # What Shadertoy puts around a pasted text.
@@ -231,13 +241,35 @@ SHADERTOY_TAIL = """
 void main() { mainImage(shadertoy_out_color, gl_FragCoord.xy); }
 """
 
+# What stands for Godot's names.
+GODOT_HEAD = """#version 330
+uniform vec2 resolution;
+out vec4 fragColor;
+#define UV vec2(gl_FragCoord.x / resolution.x, 1.0 - gl_FragCoord.y / resolution.y)
+#define COLOR fragColor
+#define fragment main
+"""
+GODOT_MODES = re.compile(r"^(shader_type|render_mode) .*;\n", re.MULTILINE)
+
 # CairoSVG sees neither filters nor blend modes, so it is no judge of the profile that has them.
 ROUND_TRIPS: dict[str, tuple[RoundTrip, ...]] = {
-    "glsl": (RoundTrip("glsl", "opengl", _draw_glsl),),
-    "shadertoy": (RoundTrip("shadertoy", "opengl", _draw_shadertoy),),
-    "wgsl": (RoundTrip("wgsl", "webgpu", _draw_wgsl),),
-    "svg": (
-        *(_drawing(engine, "filters") for engine in ("resvg", "librsvg", "chromium", "firefox")),
-        *(_drawing(engine, "portable") for engine in ("resvg", "librsvg", "chromium", "firefox", "cairosvg")),
+    "glsl": (RoundTrip("glsl", "opengl", _shader),),
+    "shadertoy": (
+        RoundTrip("shadertoy", "opengl", _shadertoy),
+        RoundTrip("shadertoy", "shadertoy", _pasted),
     ),
+    "wgsl": (RoundTrip("wgsl", "webgpu", _shader),),
+    "three": (RoundTrip("three", "three", _whole, False),),
+    "godot": (RoundTrip("godot", "opengl", _godot, False),),
+    "svg": (
+        *_svg("svg", "filters", "resvg", "librsvg", "chromium", "firefox"),
+        *_svg("svg", "portable", "resvg", "librsvg", "chromium", "firefox", "cairosvg"),
+    ),
+    "data-uri": (
+        RoundTrip("data-uri", "resvg", _decoded, False, "filters"),
+        *_svg("data-uri", "filters", "image"),
+    ),
+    "pdf": (RoundTrip("pdf", "pdfium", _whole, False),),
+    "html": (RoundTrip("html", "page", _whole, False),),
+    "component": (RoundTrip("component", "element", _element, False),),
 }

@@ -5,13 +5,9 @@ from collections.abc import Callable
 
 import pytest
 
-from sdf2vec.engines import ENGINES, glslang, shadertoy, threejs
+from sdf2vec.engines import ENGINES, glslang
 
-MISSING = {name: engine.missing for name, engine in ENGINES.items()} | {
-    "glslang": glslang.missing,
-    "shadertoy": shadertoy.missing,
-    "three": threejs.missing,
-}
+MISSING = {name: engine.missing for name, engine in ENGINES.items()} | {"glslang": glslang.missing}
 
 
 @pytest.fixture

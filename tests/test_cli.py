@@ -19,7 +19,7 @@ import pytest
 from PIL import Image
 
 import sdf2vec
-from sdf2vec import Layer, Scene, Shape
+from sdf2vec import Layer, Scene, Shape, quality
 from sdf2vec.cli import main
 from sdf2vec.engines import ENGINES
 from sdf2vec.fit import loop
@@ -126,7 +126,7 @@ def test_the_summary_names_the_quality_and_every_file(folder, run):
 
 
 def test_the_summary_says_at_which_size_flip_was_computed(folder, run, monkeypatch):
-    monkeypatch.setattr(sdf2vec.api, "FLIP_RESOLUTION", 10)
+    monkeypatch.setattr(quality, "FLIP_RESOLUTION", 10)
     line = run("photo.jpg", *SHORT, "--emit", "json").out.decode().splitlines()[0]
     assert re.search(r"dB, FLIP 0\.\d{4} at 12 x 8, ", line)
 
@@ -527,20 +527,20 @@ def test_options_reach_the_exporter(folder, run, scene_file):
     run("export", scene_file, "--emit", "glsl", "--glsl", "330", "--layout", "table", "-o", "a.glsl")
     text = (folder / "a.glsl").read_text()
     assert text.startswith("#version 330\n")
-    assert text == scene.to("glsl", glsl="330", layout="table", title="photo")
-    assert text != scene.to("glsl", glsl="330", layout="readable", title="photo")
+    assert text == sdf2vec.export(scene, "glsl", glsl="330", layout="table", title="photo")
+    assert text != sdf2vec.export(scene, "glsl", glsl="330", layout="readable", title="photo")
 
 
 def test_check_prints_a_table(folder, run, scene_file, require_engine):
     for engine in ("opengl", "webgpu"):
         require_engine(engine)
-    outcome = run("check", scene_file, "--emit", "glsl,wgsl,shadertoy")
+    outcome = run("check", scene_file, "--emit", "glsl,wgsl,godot")
     assert outcome.code == 0
     head, *rows = outcome.out.decode().splitlines()
     assert " ".join(head.split()) == "target engine size PSNR dB largest error mean error verdict"
     assert [row.split()[:2] for row in rows] == [
         [target, engine]
-        for target, engine in (("glsl", "opengl"), ("shadertoy", "opengl"), ("wgsl", "webgpu"))
+        for target, engine in (("glsl", "opengl"), ("wgsl", "webgpu"), ("godot", "opengl"))
         for _ in range(3)
     ]
     assert all(row.split()[-1] == "same" for row in rows)
@@ -553,16 +553,24 @@ def test_check_says_what_differs(folder, run, scene_file, monkeypatch, require_e
     def white(text, width, height, uniforms, texture):
         return np.ones((height, width, 4), np.float32)
 
-    monkeypatch.setitem(ENGINES, "opengl", replace(ENGINES["opengl"], render=white))
+    monkeypatch.setitem(ENGINES, "opengl", replace(ENGINES["opengl"], draw=white))
     outcome = run("check", scene_file, "--emit", "glsl")
     assert outcome.code == 1
     assert [line.split()[-1] for line in outcome.out.decode().splitlines()[1:]] == ["differs"] * 3
 
 
-def test_check_says_what_is_missing_and_how_to_get_it(folder, run, scene_file, monkeypatch):
+@pytest.fixture
+def no_engines(monkeypatch):
+    def probe():
+        raise ModuleNotFoundError(name="moderngl")
+
+    for name, engine in ENGINES.items():
+        monkeypatch.setitem(ENGINES, name, replace(engine, probe=probe))
+
+
+@pytest.mark.usefixtures("no_engines")
+def test_check_says_what_is_missing_and_how_to_get_it(folder, run, scene_file):
     advice = "the Python package moderngl is not installed: pip install 'sdf2vec[check]'"
-    for name in ENGINES:
-        monkeypatch.setitem(ENGINES, name, replace(ENGINES[name], missing=lambda: advice))
     outcome = run("check", scene_file)
     assert outcome.code == 2
     assert outcome.out.decode().count(advice) == sum(map(len, ROUND_TRIPS.values()))
@@ -570,9 +578,8 @@ def test_check_says_what_is_missing_and_how_to_get_it(folder, run, scene_file, m
     assert advice in outcome.err
 
 
-def test_a_conversion_needs_no_engine(folder, run, monkeypatch):
-    for name in ENGINES:
-        monkeypatch.setitem(ENGINES, name, replace(ENGINES[name], missing=lambda: "absent"))
+@pytest.mark.usefixtures("no_engines")
+def test_a_conversion_needs_no_engine(folder, run):
     outcome = run("photo.jpg", *SHORT, "--emit", "glsl,svg")
     assert outcome.code == 0
     assert b"draws it" not in outcome.out
@@ -583,7 +590,7 @@ def test_a_conversion_needs_no_engine(folder, run, monkeypatch):
 PROGRAM = [sys.executable, "-m", "sdf2vec.cli"]
 
 
-def test_help_and_refusals_do_without_torch():
+def test_help_and_refusals_load_nothing_heavy():
     code = """
 import sys
 from sdf2vec.cli import main
@@ -592,11 +599,11 @@ for arguments in (["--help"], ["check", "--help"], ["render", "--help"], ["expor
     try:
         main(arguments)
     except SystemExit as end:
-        print(end.code, "torch" in sys.modules, file=sys.stderr)
+        print(end.code, *{"torch", "numba", "numpy"} & set(sys.modules), file=sys.stderr)
 """
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     lines = [line for line in done.stderr.splitlines() if not line.startswith("sdf2vec: ")]
-    assert lines == ["0 False"] * 5 + ["2 False"] * 3
+    assert lines == ["0"] * 5 + ["2 numpy", "2 numpy", "2 numpy"]
     assert "--shapes" in done.stdout
     assert all(target in done.stdout for target in ALL.split(","))
     assert f"sdf2vec {sdf2vec.__version__}" in done.stdout

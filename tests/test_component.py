@@ -5,9 +5,10 @@ import json
 import numpy as np
 import pytest
 
+import sdf2vec
 from sdf2vec import Scene
 from sdf2vec.engines import chromium
-from sdf2vec.export import export
+from sdf2vec.engines.pages import ELEMENT
 from sdf2vec.expr import scalarize, var
 from sdf2vec.lower.javascript import function_text
 from sdf2vec.render import reference
@@ -16,15 +17,12 @@ from sdf2vec.scene import dumps
 from .operations import MEANINGS, expected
 from .scenes import random_scene
 
-PAGE = """<!DOCTYPE html><style>*{margin:0}</style><script type="module" src="sdf-image.js"></script>
-<sdf-image src="picture.scene.json" alt="A picture"><p>Not drawn</p></sdf-image>"""
-
 
 @pytest.fixture
 def opened(require_engine):
     require_engine("chromium")
 
-    def show(scene, width, height, page=PAGE):
+    def show(scene, width, height, page=ELEMENT):
         files = {"index.html": page, "sdf-image.js": module(), "picture.scene.json": scene}
         return chromium.opened(files, width, height)
 
@@ -32,7 +30,7 @@ def opened(require_engine):
 
 
 def module():
-    text = export(Scene(1, 1, ()), "component")
+    text = sdf2vec.export(Scene(1, 1, ()), "component")
     assert isinstance(text, str)
     return text
 

@@ -14,7 +14,8 @@ from sdf2vec.fit import loop, palette
 from sdf2vec.fit.constraints import MARGIN
 from sdf2vec.fit.loop import Fit, Progress, fit_picture
 from sdf2vec.fit.presets import MANY, PRESETS, Phase, Preset, Relocation
-from sdf2vec.fit.settings import Settings, preset_of, settings_of, weights_for, weights_of
+from sdf2vec.fit.settings import Settings, preset_of, settings_of
+from sdf2vec.fit.weights import weights_for, weights_of
 from sdf2vec.image import Picture
 from sdf2vec.metrics import mse
 from sdf2vec.render.fused import composite
@@ -472,7 +473,7 @@ def test_the_thesis_falloffs_are_held_against_a_sharp_picture():
 def test_a_batch_leaves_the_others_alone():
     fit = Fit(
         thesis_picture(),
-        Settings(8, ("circle", "ellipse"), "additive", "thesis", least_area=0.0),
+        Settings(8, ("circle", "ellipse"), "additive", "thesis", min_area=0.0),
         lambda progress: False,
     )
     batches = fit.phases[1]
@@ -516,11 +517,11 @@ ADDITIVE = Scene(48, 32, (), (0.0, 0.0, 0.0), "additive")
         ({"union": 3}, "8 shapes can't be joined by 3: choose a multiple of 3"),
         ({"trials": -1}, "number of trials .* got -1"),
         ({"trials": 1.5}, "number of trials .* got 1.5"),
-        ({"min_area": -0.1}, "least area .* up to 0.1, got -0.1"),
+        ({"min_area": -0.1}, "least area .* between 0 and 0.1, got -0.1"),
         ({"min_area": 0.11}, "least area .* got 0.11"),
         ({"min_area": float("nan")}, "least area .* got nan"),
         ({"min_area": "much"}, "least area .* got 'much'"),
-        ({"max_falloff": -0.01}, "largest falloff .* up to 1.5, got -0.01"),
+        ({"max_falloff": -0.01}, "largest falloff .* between 0 and 1.5, got -0.01"),
         ({"max_falloff": 1.6}, "largest falloff .* got 1.6"),
         ({"max_falloff": float("nan")}, "largest falloff .* got nan"),
         ({"max_falloff": "soft"}, "largest falloff .* got 'soft'"),

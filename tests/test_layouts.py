@@ -7,9 +7,11 @@ import numpy as np
 import pytest
 import torch
 
+import sdf2vec
 from sdf2vec import Layer, Scene, Sdf2vecError, Shape
 from sdf2vec.engines import glslang_validate
-from sdf2vec.export import beside, packing
+from sdf2vec.export import packing
+from sdf2vec.export.exported import Exported
 from sdf2vec.export.layouts import FILE, MODULE, OLD, PASTED, TEXT_LIMIT, choose
 from sdf2vec.export.options import Options
 from sdf2vec.export.shader import shader, short
@@ -34,9 +36,8 @@ def _quick_packing(monkeypatch):
 
 
 def draw(scene, target, size, layout, framing="fit") -> Pixels:
-    made = shader(scene, target, Options(layout=layout, framing=framing))
-    width, height = size
-    return ROUND_TRIPS[target][0].draw(made.text, width, height, made.data)
+    made = sdf2vec.exported(scene, target, layout=layout, framing=framing)
+    return ROUND_TRIPS[target][0].draw(made, scene, *size)
 
 
 def many(count, seed=0, width=60, height=40):
@@ -84,10 +85,10 @@ def test_storage_buffer_agrees_with_statements(compositing, require_engine):
 def test_packed_is_within_its_error(kinds, compositing, require_engine):
     require_engine("opengl")
     scene = random_scene(kinds, compositing, layers=16, seed=6)
-    made = shader(scene, "shadertoy", Options(layout="packed"))
+    made = sdf2vec.exported(scene, "shadertoy", layout="packed")
     assert 0.0 < made.error <= packing.LIMIT
     for size in SIZES:
-        result = compare(ROUND_TRIPS["shadertoy"][0], made.text, scene, size)
+        result = compare(ROUND_TRIPS["shadertoy"][0], made, scene, size)
         assert result.largest_error <= packing.LIMIT + 0.05, size
 
 
@@ -101,7 +102,7 @@ def test_many_shapes(require_engine):
         assert made.choice.layout == "data"
         assert made.choice.depth < 60
         for size in ((150, 102), (48, 20)):
-            drawn = ROUND_TRIPS[target][0].draw(made.text, *size, made.data)
+            drawn = ROUND_TRIPS[target][0].draw(sdf2vec.exported(scene, target), scene, *size)
             assert error_at_some_pixels(scene, drawn) <= 0.05
 
 
@@ -131,9 +132,9 @@ def test_odd_canvases(layout, size, require_engine, monkeypatch):
     require_engine("opengl")
     monkeypatch.setattr(packing, "SAMPLE", 1 << 21)  # a picture that is a strip of the canvas
     scene = random_scene(width=size[0], height=size[1], seed=8, layers=9)
-    made = shader(scene, "glsl", Options(layout=layout))
+    made = sdf2vec.exported(scene, "glsl", layout=layout)
     for canvas in (size, (50, 130)):
-        result = compare(ROUND_TRIPS["glsl"][0], made.text, scene, canvas, made.data)
+        result = compare(ROUND_TRIPS["glsl"][0], made, scene, canvas)
         assert result.largest_error <= (1.0 if layout == "packed" else 0.1), canvas
 
 
@@ -142,8 +143,8 @@ def test_odd_canvases(layout, size, require_engine, monkeypatch):
 def test_hardly_any_shapes(layout, layers, require_engine):
     require_engine("opengl")
     scene = random_scene(("circle",), layers=layers, seed=3)
-    made = shader(scene, "glsl", Options(layout=layout))
-    result = compare(ROUND_TRIPS["glsl"][0], made.text, scene, (140, 110), made.data)
+    made = sdf2vec.exported(scene, "glsl", layout=layout)
+    result = compare(ROUND_TRIPS["glsl"][0], made, scene, (140, 110))
     assert result.largest_error <= made.error + 0.1
 
 
@@ -173,7 +174,8 @@ def test_animated_shapes_move_a_little_and_alike(layout, require_engine):
 
 
 def _at_time(text, seconds):
-    return ROUND_TRIPS["shadertoy"][0].draw(text.replace("iTime", str(seconds)), 150, 110, None)
+    made = Exported(text.replace("iTime", str(seconds)))
+    return ROUND_TRIPS["shadertoy"][0].draw(made, Scene(1, 1, ()), 150, 110)
 
 
 def test_only_a_shadertoy_moves():
@@ -284,14 +286,14 @@ def test_the_choice_is_said():
 
 
 def test_files_beside_the_text_hold_the_data():
-    scene, options = many(20), Options(layout="data")
-    made = shader(scene, "wgsl", options)
+    scene = many(20)
+    made = shader(scene, "wgsl", Options(layout="data"))
     assert made.data is not None
-    files = beside(scene, "wgsl", options)
+    files = sdf2vec.exported(scene, "wgsl", layout="data").beside
     assert set(files) == {".wgsl.bin", ".wgsl.data.js"}
     np.testing.assert_array_equal(np.frombuffer(files[".wgsl.bin"], "<f4"), made.data.ravel())
     assert b"Float32Array" in files[".wgsl.data.js"]
-    assert beside(scene, "wgsl", Options(layout="readable")) == {}
+    assert sdf2vec.exported(scene, "wgsl", layout="readable").beside == {}
     alone = shader(many(4096), "glsl", Options(alone=True))
     assert alone.data is None
 

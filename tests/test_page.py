@@ -10,9 +10,8 @@ import pytest
 import sdf2vec
 from sdf2vec import Layer, Scene, Shape
 from sdf2vec.engines import chromium
-from sdf2vec.export import export, packing
+from sdf2vec.export import packing
 from sdf2vec.export import page as page_module
-from sdf2vec.export.options import Options
 from sdf2vec.image import encode_png
 
 from .scenes import random_scene
@@ -28,7 +27,7 @@ def _quick_packing(monkeypatch):
 
 
 def page_of(scene, **options):
-    text = export(scene, "html", Options(title='a "quoted" <picture>', **options))
+    text = sdf2vec.export(scene, "html", title='a "quoted" <picture>', **options)
     assert isinstance(text, str)
     return text
 
@@ -109,7 +108,7 @@ def test_buttons_copy_the_texts(opened):
 
 
 def _text(name):
-    return export(SCENE, name, Options(title='a "quoted" <picture>', alone=True))
+    return sdf2vec.export(SCENE, name, title='a "quoted" <picture>', alone=True)
 
 
 def _canonical(drawing):
@@ -143,7 +142,7 @@ def test_page_speaks_to_screen_readers(opened):
 
 
 def test_texts_can_not_end_the_script():
-    page = export(SCENE, "html", Options(title="</script><script>alert(1)</script>"))
+    page = sdf2vec.export(SCENE, "html", title="</script><script>alert(1)</script>")
     assert isinstance(page, str)
     texts = re.search(r'id="texts">(.*?)</script>', page, re.DOTALL)
     assert texts

@@ -1,13 +1,15 @@
 """Exports drawn by real engines against the torch render in float64: the promise of the project."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 import sdf2vec
-from sdf2vec import Layer, Scene, Shape, blend, roundtrip
+from sdf2vec import Layer, Scene, Shape, blend, exports, roundtrip
 from sdf2vec.engines import ENGINES, glslang_validate
-from sdf2vec.export import export
-from sdf2vec.export.options import Options
+from sdf2vec.export import EXPORTERS
+from sdf2vec.export.exported import Exported
 from sdf2vec.lower.shader import literal
 from sdf2vec.roundtrip import ROUND_TRIPS, compare
 from sdf2vec.shapes import KINDS
@@ -19,15 +21,15 @@ LARGEST, MEAN = 0.25, 0.05  # levels of 255
 
 
 def text_of(scene: Scene, target: str, **options: str) -> str:
-    text = export(scene, target, Options(**options))  # type: ignore[arg-type]
+    text = sdf2vec.export(scene, target, **options)
     assert isinstance(text, str)
     return text
 
 
 def assert_same(scene, target, sizes=SIZES, largest=LARGEST, **options):
-    text = text_of(scene, target, **options)
+    made = sdf2vec.exported(scene, target, **options)
     for size in sizes:
-        result = compare(ROUND_TRIPS[target][0], text, scene, size)
+        result = compare(ROUND_TRIPS[target][0], made, scene, size)
         assert result.largest_error <= largest, (target, size, result)
         assert abs(result.mean_error) <= MEAN, (target, size, result)
 
@@ -101,8 +103,8 @@ def test_a_fitted_photo_with_mixed_kinds(target, photo_scene, require_engine):
 
 def test_eight_bit_read_back_is_within_a_level(photo_scene, require_engine):
     require_engine("opengl")
-    text = text_of(photo_scene, "glsl")
-    drawn = ROUND_TRIPS["glsl"][0].draw(text, 150, 100, None)
+    made = sdf2vec.exported(photo_scene, "glsl")
+    drawn = ROUND_TRIPS["glsl"][0].draw(made, photo_scene, 150, 100)
     png = sdf2vec.render(photo_scene, 150, 100)
     eight = [np.round(np.clip(pixels[..., :3], 0, 1) * 255) for pixels in (drawn, png)]
     assert np.abs(eight[0] - eight[1]).max() <= 1
@@ -116,7 +118,7 @@ def test_a_formula_that_drifts_is_seen(target, require_engine, monkeypatch):
     number = literal(blend.STEEPNESS)
     assert f"{number} * (0.5 * falloff" in text
     broken = text.replace(f"{number} * (0.5 * falloff", f"{number[:-1]}2 * (0.5 * falloff")
-    result = compare(ROUND_TRIPS[target][0], broken, random_scene(seed=1), (60, 40))
+    result = compare(ROUND_TRIPS[target][0], Exported(broken), random_scene(seed=1), (60, 40))
     assert result.largest_error > LARGEST
     assert result.verdict != "same"
 
@@ -127,31 +129,64 @@ def test_half_a_pixel_is_seen(target, require_engine):
     text = text_of(random_scene(seed=1), target)
     broken = text.replace("(pixel - 0.5 * resolution)", "(pixel - 0.5 * resolution + 0.5)")
     assert broken != text
-    assert compare(ROUND_TRIPS[target][0], broken, random_scene(seed=1), (60, 40)).largest_error > LARGEST
+    assert (
+        compare(ROUND_TRIPS[target][0], Exported(broken), random_scene(seed=1), (60, 40)).largest_error
+        > LARGEST
+    )
 
 
-def test_check_reports_every_target_at_three_sizes(require_engine):
+def test_check_reports_every_target(require_engine):
     for engine in ENGINES:
         require_engine(engine)
-    results = sdf2vec.check(random_scene(seed=9, layers=4))
-    assert {result.target for result in results} == {"glsl", "shadertoy", "wgsl", "svg", "svg portable"}
-    assert all(result.verdict == "same" for result in results if "svg" not in result.target)
-    assert len(results) == 3 * sum(map(len, ROUND_TRIPS.values()))
+    scene = random_scene(seed=9, layers=4)
+    results = sdf2vec.check(scene, sizes=[(60, 40)])
+    assert len(results) == sum(map(len, ROUND_TRIPS.values()))
+    assert not any(result.missing for result in results)
+    exact = {r.target for r in results if r.verdict == "same"}
+    assert exact >= {"glsl", "shadertoy", "wgsl", "godot"}
+    assert {r.target for r in results if r.largest_error < 1.1} >= {*exact, "three", "html", "component"}
+    assert set(ROUND_TRIPS) == set(EXPORTERS) - {"json", "png"}
+
+
+def test_three_sizes_unless_told(require_engine):
+    require_engine("opengl")
+    sizes = [(r.width, r.height) for r in sdf2vec.check(random_scene(seed=9, layers=1), ["glsl", "godot"])]
+    assert sizes == [(60, 40), (76, 46), (19, 13), (60, 40), (120, 80), (36, 24)]
+
+
+def test_check_converts_an_additive_scene_once(require_engine, monkeypatch):
+    for engine in ("resvg", "librsvg", "pdfium"):
+        require_engine(engine)
+    scene, fits = random_scene(compositing="additive", layers=3, seed=2, transparent=True), []
+
+    def over_of(scene):
+        fits.append(scene)
+        return replace(scene, layers=(), compositing="over"), 12.0
+
+    monkeypatch.setattr(exports, "_over_of", over_of)
+    for name in ("chromium", "firefox", "image", "cairosvg"):
+        monkeypatch.setitem(ENGINES, name, absent(name))
+    results = [r for r in sdf2vec.check(scene, ["svg", "data-uri", "pdf"], [(60, 40)]) if not r.missing]
+    assert len(results) == 6
+    assert fits == [scene]
+
+
+def absent(name, reason="not here"):
+    def probe():
+        raise OSError(reason)
+
+    return replace(ENGINES[name], probe=probe, advice="get it")
 
 
 def test_check_says_what_is_missing(monkeypatch):
-    class Missing:
-        def missing(self):
-            return "not installed: pip install it"
-
-    monkeypatch.setitem(ENGINES, "opengl", Missing())
+    monkeypatch.setitem(ENGINES, "opengl", absent("opengl"))
     (result,) = sdf2vec.check(random_scene(seed=9, layers=1), ["glsl"])
-    assert (result.verdict, result.missing) == ("not checked", "not installed: pip install it")
+    assert (result.verdict, result.missing) == ("not checked", "not here; get it")
 
 
 def test_shader_text_is_readable():
     circle = Shape.of("circle", (1, 0.5, 0), center=(0.1, -0.2), radius=0.25)
-    text = export(Scene(30, 20, (Layer((circle,), 0.05, 0.9),)), "glsl", Options(title="photo.png"))
+    text = text_of(Scene(30, 20, (Layer((circle,), 0.05, 0.9),)), "glsl", title="photo.png")
     line = (
         "  c = over(c, vec3(1.0, 0.5, 0.0), 0.9, coverage(sdCircle(p - vec2(0.1, -0.2), 0.25), 0.05, pixel));"
     )

@@ -9,6 +9,7 @@ import torch
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
+import sdf2vec
 from sdf2vec import KINDS, Layer, Scene, SceneError, Sdf2vecError, Shape, dumps, load, loads, save
 from sdf2vec.render.reference import render
 from sdf2vec.scene import MAX_SHAPES, MAX_SIDE, MAX_UNION
@@ -394,8 +395,8 @@ def test_the_largest_union_can_be_exported_and_drawn():
     union = UNION | {"union": [BLOB | {"center": [i / MAX_UNION, 0]} for i in range(MAX_UNION)]}
     scene = loads(json.dumps(VALID | {"layers": [union], "width": 3, "height": 2}))
     for target in ("glsl", "shadertoy", "wgsl", "png"):
-        assert scene.to(target)
-    assert scene.to("glsl", layout="readable")
+        assert sdf2vec.export(scene, target)
+    assert sdf2vec.export(scene, "glsl", layout="readable")
 
 
 @pytest.mark.parametrize("depth", [10, 900, 950, 970, 980, 990, 1000, 100_000])

@@ -20,7 +20,7 @@ def table(results: list[Check], name: str, about: str, command: str) -> str:
         "",
         f"{name}, {about}. Each export drawn by a real engine and compared with the torch render in float64, over "
         "all pixels and RGBA; errors in 8-bit levels, the mean signed. OpenGL and WebGPU are read back as floats, "
-        "resvg as 8 bits.",
+        "all others as 8 bits.",
         "",
         f"    {command}",
         "",

@@ -20,9 +20,9 @@ from numpy.typing import NDArray
 
 from .. import api
 from ..engines import ENGINES
-from ..export import export
 from ..export.options import Options
 from ..export.svg import smallest
+from ..exports import Exports
 from ..files import write_atomically
 from ..image import Picture, load, premultiply
 from ..render.draw import draw
@@ -117,7 +117,7 @@ def rows(name: str, scene: Scene, picture: Picture, kind: str, profiles: list[st
 def _text(scene: Scene, profile: str, name: str) -> str:
     if profile == SMALLEST:
         return smallest(scene, Options(title=name))
-    text = export(scene, "svg", Options(svg_profile=profile, title=name))
+    text = Exports(scene).export("svg", Options(svg_profile=profile, title=name)).data
     assert isinstance(text, str)
     return text
 

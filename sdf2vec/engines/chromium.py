@@ -11,20 +11,11 @@ import tempfile
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from functools import cache
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
-from sdf2vec.engines.engine import (
-    EngineError,
-    Picture,
-    pixels_of,
-    reason_missing,
-    require_drawable,
-    require_present,
-    with_viewport,
-)
+from playwright.sync_api import BrowserContext, Page, Route, sync_playwright
 
-if TYPE_CHECKING:
-    from playwright.sync_api import BrowserContext, Page, Route
+from sdf2vec.engines.engine import EngineError, Picture, pixels_of, require_drawable, with_viewport
 
 PROGRAMS = ("chromium", "chromium-browser", "google-chrome", "google-chrome-stable")
 ORIGIN = "http://localhost/"  # a secure context, which WebGPU wants; requests never leave the process
@@ -57,77 +48,8 @@ IMAGE_PAGE = (
 
 
 @cache
-def missing() -> str | None:
-    """None if Chromium works here, else one line on what is missing and how to get it."""
-    return reason_missing(_browser, "a browser is needed: apt-get install chromium")
-
-
-def render(svg: str, width: int, height: int) -> Picture:
-    """Draws an SVG, as an `<img>` in a page, into a viewport of `width` × `height` pixels.
-
-    Returns:
-        float32 `[height, width, 4]` in 0..1 with straight (not premultiplied) alpha, row 0 at the top.
-
-    Raises:
-        EngineError: Chromium is missing, the size is out of range or the SVG is refused.
-    """
-    sized = with_viewport(svg, width, height)
-    with opened({"index.html": IMAGE_PAGE, "picture.svg": sized}, width, height) as page:
-        try:
-            page.evaluate("document.getElementById('picture').decode()")
-        except Exception as error:  # Playwright's own error; its first line is the page's exception
-            raise EngineError(f"Chromium refuses the SVG: {_first_line(error)}", log=str(error)) from None
-        return screenshot(page)
-
-
-@contextmanager
-def opened(files: Mapping[str, str | bytes], width: int, height: int) -> Iterator["Page"]:
-    """A page that shows `files["index.html"]` in a viewport of `width` × `height` pixels, one device pixel each.
-
-    Other files are found by their names relative to it; every other address fails. The page is Playwright's
-    (`evaluate`, `wait_for_function`, `on("console", …)`), and is closed at the end. `evaluate` gives Playwright's
-    own errors.
-
-    Raises:
-        EngineError: Chromium is missing or the size is out of range.
-    """
-    require_drawable(width, height)
-    require_present(missing())
-    page = _browser().new_page()
-    try:
-        page.set_default_timeout(1000 * SECONDS)
-        page.set_viewport_size({"width": width, "height": height})
-        page.route("**/*", lambda route: _answer(route, files))
-        page.goto(ORIGIN, wait_until="load")
-        yield page
-    finally:
-        page.close()
-
-
-def screenshot(page: "Page", selector: str | None = None) -> Picture:
-    """What a page, or the first element that a CSS selector finds in it, shows now.
-
-    Returns:
-        float32 `[height, width, 4]` in 0..1 with straight alpha: a page without a background is transparent.
-    """
-    place = page.locator(selector).first if selector else page
-    png = place.screenshot(type="png", omit_background=True, animations="disabled")
-    return pixels_of(png)
-
-
-def _answer(route: "Route", files: Mapping[str, str | bytes]) -> None:
-    name = route.request.url.partition("?")[0].removeprefix(ORIGIN) or "index.html"
-    if name in files:
-        kind = mimetypes.guess_type(name)[0] or "application/octet-stream"
-        route.fulfill(body=files[name], content_type=f"{kind}; charset=utf-8")
-    else:
-        route.abort()
-
-
-@cache
-def _browser() -> "BrowserContext":
-    from playwright.sync_api import sync_playwright
-
+def probe() -> BrowserContext:
+    """The browser. Raises where it does not start."""
     program = next(filter(None, map(shutil.which, PROGRAMS)), None)
     if program is None:
         raise EngineError("Chromium is not installed")
@@ -139,6 +61,67 @@ def _browser() -> "BrowserContext":
     browser = playwright.chromium.launch_persistent_context(profile, device_scale_factor=1, **options)
     atexit.register(browser.close)
     return browser
+
+
+def render(svg: str, width: int, height: int) -> Picture:
+    """Draws an SVG, as an `<img>` in a page, into a viewport of `width` × `height` pixels.
+
+    Returns:
+        float32 `[height, width, 4]` in 0..1 with straight (not premultiplied) alpha, row 0 at the top.
+
+    Raises:
+        EngineError: the SVG is refused.
+    """
+    sized = with_viewport(svg, width, height)
+    with opened({"index.html": IMAGE_PAGE, "picture.svg": sized}, width, height) as page:
+        try:
+            page.evaluate("document.getElementById('picture').decode()")
+        except Exception as error:  # Playwright's own error; its first line is the page's exception
+            raise EngineError(f"Chromium refuses the SVG: {_first_line(error)}", log=str(error)) from None
+        return screenshot(page)
+
+
+@contextmanager
+def opened(files: Mapping[str, str | bytes], width: int, height: int) -> Iterator[Page]:
+    """A page that shows `files["index.html"]` in a viewport of `width` × `height` pixels, one device pixel each.
+
+    Other files are found by their names relative to it; every other address fails. The page is Playwright's
+    (`evaluate`, `wait_for_function`, `on("console", …)`), and is closed at the end. `evaluate` gives Playwright's
+    own errors.
+
+    Raises:
+        EngineError: Chromium is missing or the size is out of range.
+    """
+    require_drawable(width, height)
+    page = probe().new_page()
+    try:
+        page.set_default_timeout(1000 * SECONDS)
+        page.set_viewport_size({"width": width, "height": height})
+        page.route("**/*", lambda route: _answer(route, files))
+        page.goto(ORIGIN, wait_until="load")
+        yield page
+    finally:
+        page.close()
+
+
+def screenshot(page: Page, selector: str | None = None) -> Picture:
+    """What a page, or the first element that a CSS selector finds in it, shows now.
+
+    Returns:
+        float32 `[height, width, 4]` in 0..1 with straight alpha: a page without a background is transparent.
+    """
+    place = page.locator(selector).first if selector else page
+    png = place.screenshot(type="png", omit_background=True, animations="disabled")
+    return pixels_of(png)
+
+
+def _answer(route: Route, files: Mapping[str, str | bytes]) -> None:
+    name = route.request.url.partition("?")[0].removeprefix(ORIGIN) or "index.html"
+    if name in files:
+        kind = mimetypes.guess_type(name)[0] or "application/octet-stream"
+        route.fulfill(body=files[name], content_type=f"{kind}; charset=utf-8")
+    else:
+        route.abort()
 
 
 def _first_line(error: Exception) -> str:

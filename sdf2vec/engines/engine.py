@@ -4,6 +4,9 @@ import io
 from collections.abc import Callable, Mapping
 from contextlib import suppress
 from dataclasses import dataclass
+from functools import cache
+from importlib import import_module
+from typing import Any
 from xml.etree import ElementTree
 
 import numpy as np
@@ -32,15 +35,36 @@ class EngineError(Sdf2vecError):
 class Engine:
     """A program that draws an export without this package's own renderer.
 
-    `missing()` is None where the engine works and otherwise one line on how to get it; it never raises.
-    `render(text, width, height, ...)` returns float32 RGBA `[height, width, 4]`, row 0 at the top.
+    `probe()` raises where it does not work, `advice` says how to get it. `is_quick`: a picture takes it no seconds.
     """
 
     name: str
-    missing: Callable[[], str | None]
-    render: Callable[..., Picture]
+    probe: Callable[[], object]
+    draw: Callable[..., Picture]
+    advice: str
+    is_quick: bool = True
+
+    def missing(self) -> str | None:
+        """None where the engine works, else one line on how to get it; never raises."""
+        return reason_missing(self.probe, self.advice)
+
+    def render(self, content: str | bytes, width: int, height: int, **more: Any) -> Picture:
+        """Draws an export into `width` × `height` pixels; `more` is what the engine's own `render` takes.
+
+        Returns:
+            float32 RGBA `[height, width, 4]`, row 0 at the top.
+
+        Raises:
+            EngineError: the engine is missing, the size is out of range or the export is refused.
+        """
+        require_drawable(width, height)
+        reason = self.missing()
+        if reason is not None:
+            raise EngineError(reason)
+        return self.draw(content, width, height, **more)
 
 
+@cache
 def reason_missing(probe: Callable[[], object], advice: str) -> str | None:
     """None if `probe()` works, else one line: what failed and the advice that mends it."""
     try:
@@ -57,13 +81,7 @@ def reason_missing(probe: Callable[[], object], advice: str) -> str | None:
 def load_triton() -> None:
     """Loads Triton where it is installed: its LLVM crashes when a Mesa driver has brought another one before."""
     with suppress(ImportError):
-        import triton  # noqa: F401
-
-
-def require_present(reason: str | None) -> None:
-    """Raises EngineError with the reason why an engine is missing, if there is one."""
-    if reason is not None:
-        raise EngineError(reason)
+        import_module("triton")
 
 
 def require_drawable(width: int, height: int) -> None:
@@ -85,9 +103,8 @@ def with_viewport(svg: str, width: int, height: int) -> str:
     """An SVG with another width and height, fitted into them and centred, just as a browser does.
 
     Raises:
-        EngineError: the size is out of range or the text is no SVG.
+        EngineError: the text is no SVG.
     """
-    require_drawable(width, height)
     try:
         root = ElementTree.fromstring(svg)
     except ElementTree.ParseError as error:

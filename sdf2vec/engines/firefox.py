@@ -11,7 +11,7 @@ from pathlib import Path
 
 import numpy as np
 
-from sdf2vec.engines.engine import EngineError, Picture, pixels_of, require_present, with_viewport
+from sdf2vec.engines.engine import EngineError, Picture, pixels_of, with_viewport
 
 PROGRAMS = ("firefox-esr", "firefox")
 SECONDS = 120.0
@@ -36,9 +36,12 @@ PAGE = (
 
 
 @cache
-def missing() -> str | None:
-    """None if Firefox is here, else one line on how to get it."""
-    return None if _program() else "Firefox is not installed: apt-get install firefox-esr"
+def probe() -> str:
+    """The program. Raises EngineError where it is not here."""
+    program = next(filter(None, map(shutil.which, PROGRAMS)), None)
+    if program is None:
+        raise EngineError("Firefox is not installed")
+    return program
 
 
 def render(svg: str, width: int, height: int) -> Picture:
@@ -48,10 +51,9 @@ def render(svg: str, width: int, height: int) -> Picture:
         float32 `[height, width, 4]` in 0..1 with straight (not premultiplied) alpha, row 0 at the top.
 
     Raises:
-        EngineError: Firefox is missing, the size is out of range or no picture came.
+        EngineError: no picture came.
     """
     sized = with_viewport(svg, width, height)
-    require_present(missing())
     with tempfile.TemporaryDirectory(prefix="sdf2vec-firefox-", ignore_cleanup_errors=True) as name:
         folder = Path(name)
         (folder / "profile").mkdir()
@@ -72,7 +74,7 @@ def _with_alpha(on_white: Picture, on_black: Picture) -> Picture:
 def _screenshot(folder: Path, width: int, height: int) -> Picture:
     """RGB [height, width, 3] of the page in a folder."""
     output = folder / "out.png"
-    command = [str(_program()), "--headless", "--no-remote", "--profile", str(folder / "profile")]
+    command = [probe(), "--headless", "--no-remote", "--profile", str(folder / "profile")]
     command += [f"--window-size={max(width, 450)},{max(height, 100)}", "--screenshot", str(output)]
     command += [(folder / "index.html").as_uri()]
     try:
@@ -87,8 +89,3 @@ def _screenshot(folder: Path, width: int, height: int) -> Picture:
             f"Firefox drew {pixels.shape[1]} × {pixels.shape[0]} pixels, not {width} × {height}"
         )
     return pixels
-
-
-@cache
-def _program() -> str | None:
-    return next(filter(None, map(shutil.which, PROGRAMS)), None)

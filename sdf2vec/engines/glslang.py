@@ -4,7 +4,7 @@ import shutil
 import subprocess
 from functools import cache
 
-from sdf2vec.engines.engine import require_present
+from sdf2vec.engines.engine import EngineError
 
 PROGRAM = "glslangValidator"
 
@@ -21,7 +21,8 @@ def glslang_validate(fragment: str) -> str | None:
     Raises:
         EngineError: glslangValidator is missing.
     """
-    require_present(missing())
+    if reason := missing():
+        raise EngineError(reason)
     command = [PROGRAM, "--stdin", "-S", "frag"]
     done = subprocess.run(
         command, input=fragment, capture_output=True, text=True, encoding="utf-8", check=False

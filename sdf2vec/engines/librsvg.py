@@ -2,17 +2,16 @@
 
 import shutil
 import subprocess
-from functools import cache
 
-from sdf2vec.engines.engine import EngineError, Picture, pixels_of, require_present, with_viewport
+from sdf2vec.engines.engine import EngineError, Picture, pixels_of, with_viewport
 
 PROGRAM = "rsvg-convert"
 
 
-@cache
-def missing() -> str | None:
-    """None if librsvg's command is here, else one line on how to get it."""
-    return None if shutil.which(PROGRAM) else f"{PROGRAM} is not installed: apt-get install librsvg2-bin"
+def probe() -> None:
+    """Raises where librsvg's command is not here."""
+    if not shutil.which(PROGRAM):
+        raise EngineError(f"{PROGRAM} is not installed")
 
 
 def render(svg: str, width: int, height: int) -> Picture:
@@ -22,10 +21,9 @@ def render(svg: str, width: int, height: int) -> Picture:
         float32 `[height, width, 4]` in 0..1 with straight (not premultiplied) alpha, row 0 at the top.
 
     Raises:
-        EngineError: librsvg is missing, the size is out of range or the SVG is refused.
+        EngineError: the SVG is refused.
     """
     sized = with_viewport(svg, width, height)
-    require_present(missing())
     done = subprocess.run([PROGRAM, "--unlimited"], input=sized.encode(), capture_output=True, check=False)
     if done.returncode != 0:
         log = done.stderr.decode(errors="replace")

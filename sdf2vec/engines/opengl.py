@@ -7,17 +7,10 @@ from functools import cache
 from types import MappingProxyType
 from typing import Any
 
+import moderngl
 import numpy as np
 
-from sdf2vec.engines.engine import (
-    EngineError,
-    Picture,
-    Uniforms,
-    load_triton,
-    reason_missing,
-    require_drawable,
-    require_present,
-)
+from sdf2vec.engines.engine import EngineError, Picture, Uniforms, load_triton
 
 # Three corners of a triangle that covers the screen; `gl_VertexID` makes buffers needless.
 VERTEX_SHADER = """{version}
@@ -34,11 +27,11 @@ ERROR_LINE = re.compile(
 
 
 @cache
-def missing() -> str | None:
-    """None if OpenGL works here, else one line on what is missing and how to get it."""
-    return reason_missing(
-        _context, "OpenGL off screen needs a driver: apt-get install libegl1 libgl1 libgl1-mesa-dri"
-    )
+def probe() -> Any:
+    """The context. Raises where OpenGL does not work."""
+    load_triton()
+    settings: dict[str, Any] = {"backend": "egl"}
+    return moderngl.create_context(standalone=True, **settings)
 
 
 def render(
@@ -62,14 +55,10 @@ def render(
         float32 `[height, width, 4]`, row 0 at the top (GL's own row 0 is at the bottom), values unclamped.
 
     Raises:
-        EngineError: OpenGL is missing, the size is out of range or the shader is refused.
+        EngineError: the shader is refused.
     """
-    require_drawable(width, height)
-    require_present(missing())
-    import moderngl
-
     try:
-        with _context() as context, ExitStack() as release:  # released while the context is current
+        with probe() as context, ExitStack() as release:  # released while the context is current
             program = _program(context, fragment, release.callback)
             _set_uniforms(program, uniforms)
             if texture is not None:
@@ -91,15 +80,6 @@ def _draw(context: Any, program: Any, size: tuple[int, int], on_release: Callabl
     triangle.render(vertices=3)
     pixels: bytes = framebuffer.read(components=4, dtype="f4", alignment=1)
     return pixels
-
-
-@cache
-def _context() -> Any:
-    import moderngl
-
-    load_triton()
-    settings: dict[str, Any] = {"backend": "egl"}
-    return moderngl.create_context(standalone=True, **settings)
 
 
 def _program(context: Any, fragment: str, on_release: Callable[..., object]) -> Any:

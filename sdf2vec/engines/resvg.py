@@ -1,22 +1,15 @@
 """SVG drawn by resvg."""
 
-from functools import cache
+import resvg_py
 
-from sdf2vec.engines.engine import (
-    SVG_NAMESPACE,
-    EngineError,
-    Picture,
-    pixels_of,
-    reason_missing,
-    require_present,
-    with_viewport,
-)
+from sdf2vec.engines.engine import SVG_NAMESPACE, EngineError, Picture, pixels_of, with_viewport
 
 
-@cache
-def missing() -> str | None:
-    """None if resvg works here, else one line on what is missing and how to get it."""
-    return reason_missing(_draw_nothing, "reinstall it: pip install --force-reinstall resvg_py")
+def probe() -> None:
+    """Raises where resvg does not work."""
+    resvg_py.svg_to_bytes(
+        svg_string=f'<svg xmlns="{SVG_NAMESPACE}" width="1" height="1"/>', skip_system_fonts=True
+    )
 
 
 def render(svg: str, width: int, height: int) -> Picture:
@@ -29,22 +22,11 @@ def render(svg: str, width: int, height: int) -> Picture:
         float32 `[height, width, 4]` in 0..1 with straight (not premultiplied) alpha, row 0 at the top.
 
     Raises:
-        EngineError: resvg is missing, the size is out of range or the SVG is refused.
+        EngineError: the SVG is refused.
     """
     sized = with_viewport(svg, width, height)
-    require_present(missing())
-    import resvg_py
-
     try:
         png = resvg_py.svg_to_bytes(svg_string=sized, skip_system_fonts=True)
     except ValueError as error:
         raise EngineError(f"resvg refuses the SVG: {error}", log=str(error)) from None
     return pixels_of(png)
-
-
-def _draw_nothing() -> None:
-    import resvg_py
-
-    resvg_py.svg_to_bytes(
-        svg_string=f'<svg xmlns="{SVG_NAMESPACE}" width="1" height="1"/>', skip_system_fonts=True
-    )

@@ -7,18 +7,11 @@ It wants another version of wgpu than this package, so it lives in an environmen
 import os
 import subprocess
 import sys
-from functools import cache
 from pathlib import Path
 
 import numpy as np
 
-from sdf2vec.engines.engine import (
-    EngineError,
-    Picture,
-    reason_missing,
-    require_drawable,
-    require_present,
-)
+from sdf2vec.engines.engine import EngineError, Picture
 
 SECONDS = 120
 DRAW = """
@@ -32,12 +25,9 @@ sys.stdout.buffer.write(np.ascontiguousarray(shader.snapshot()).tobytes())
 NOTHING = "void mainImage(out vec4 fragColor, in vec2 fragCoord) { fragColor = vec4(1.0); }"
 
 
-@cache
-def missing() -> str | None:
-    """None if wgpu-shadertoy works here, else one line on how to get it."""
-    return reason_missing(
-        lambda: _draw(NOTHING, 4, 4), "make engines puts wgpu-shadertoy in a place of its own"
-    )
+def probe() -> None:
+    """Raises where wgpu-shadertoy does not work."""
+    render(NOTHING, 4, 4)
 
 
 def render(text: str, width: int, height: int) -> Picture:
@@ -47,14 +37,8 @@ def render(text: str, width: int, height: int) -> Picture:
         float32 `[height, width, 4]` of 8-bit levels in 0..1, row 0 at the top.
 
     Raises:
-        EngineError: the client is missing, the size is out of range or the text is refused.
+        EngineError: the text is refused.
     """
-    require_drawable(width, height)
-    require_present(missing())
-    return _draw(text, width, height)
-
-
-def _draw(text: str, width: int, height: int) -> Picture:
     environment = os.environ | {"WGPU_FORCE_OFFSCREEN": "true"}
     command = [str(_python()), "-c", DRAW, str(width), str(height)]
     done = subprocess.run(

@@ -10,16 +10,9 @@ from types import MappingProxyType
 from typing import Any, NamedTuple
 
 import numpy as np
+import wgpu
 
-from sdf2vec.engines.engine import (
-    EngineError,
-    Picture,
-    Uniforms,
-    load_triton,
-    reason_missing,
-    require_drawable,
-    require_present,
-)
+from sdf2vec.engines.engine import EngineError, Picture, Uniforms, load_triton
 
 TARGET_FORMAT = "rgba32float"
 
@@ -49,11 +42,11 @@ class Binding(NamedTuple):
 
 
 @cache
-def missing() -> str | None:
-    """None if WebGPU works here, else one line on what is missing and how to get it."""
-    return reason_missing(
-        _device, "WebGPU needs a Vulkan driver: apt-get install mesa-vulkan-drivers libvulkan1"
-    )
+def probe() -> Any:
+    """The device. Raises where WebGPU does not work."""
+    load_triton()
+    with _runtime_folder():
+        return wgpu.gpu.request_adapter_sync().request_device_sync()
 
 
 def render(
@@ -80,13 +73,8 @@ def render(
         float32 `[height, width, 4]`, row 0 at the top, values unclamped.
 
     Raises:
-        EngineError: WebGPU is missing, the size is out of range, a declared resource has no value or the
-            module is refused.
+        EngineError: a declared resource has no value or the module is refused.
     """
-    require_drawable(width, height)
-    require_present(missing())
-    import wgpu
-
     contents = _contents(code, uniforms, texture)
     try:
         with ExitStack() as release:
@@ -102,10 +90,8 @@ def _draw(
     contents: dict[Binding, bytes],
     on_release: Callable[..., object],
 ) -> Picture:
-    import wgpu
-
     width, height = size
-    device = _device()
+    device = probe()
     layout, group = _bind(device, contents, on_release)
     pipeline = _pipeline(device, code, entry, layout)
     usage = wgpu.TextureUsage.RENDER_ATTACHMENT | wgpu.TextureUsage.COPY_SRC
@@ -156,8 +142,6 @@ def _bind(device: Any, contents: dict[Binding, bytes], on_release: Callable[...,
 
     The layout is spelled out, because an automatic one lacks what the entry point declares but never reads.
     """
-    import wgpu
-
     usages = {"uniform": wgpu.BufferUsage.UNIFORM, "storage": wgpu.BufferUsage.STORAGE}
     types = {"uniform": "uniform", "storage": "read-only-storage"}
     visibility = wgpu.ShaderStage.FRAGMENT | wgpu.ShaderStage.VERTEX
@@ -180,15 +164,6 @@ def _summary(log: str) -> str:
         return f"WebGPU fails: {log.partition('Caused by:')[2] or log}"
     place = f" at line {line[1]}" if line else ""
     return f"WebGPU refuses the shader{place}: {'; '.join([title[1], *ERROR_NOTE.findall(log)])}"
-
-
-@cache
-def _device() -> Any:
-    load_triton()
-    with _runtime_folder():
-        import wgpu
-
-        return wgpu.gpu.request_adapter_sync().request_device_sync()
 
 
 @contextmanager

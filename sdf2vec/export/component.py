@@ -14,6 +14,7 @@ from ..paints import FLAT, PAINTS
 from ..scene import FORMAT, MAX_JOINED, VERSION, Scene
 from ..shapes import KINDS
 from ..templating import template
+from .exported import Exported
 from .options import Options
 from .records import Form, Variant, record_scalars
 from .shader import DATA_WIDTH, table_part
@@ -22,7 +23,7 @@ from .tiles import COARSEST
 SLACK = var("slack")
 
 
-def component(scene: Scene, options: Options) -> str:
+def component(scene: Scene, options: Options) -> Exported:
     """An ES module that defines the element; it is the same for every scene."""
     variants = tuple(
         Variant(kind, paint)
@@ -30,7 +31,7 @@ def component(scene: Scene, options: Options) -> str:
         for paint in PAINTS
     )
     forms = {name: Form(variants, tuple(JOINS), name) for name in COMPOSITING}
-    return template("component.js.jinja").render(
+    text = template("component.js.jinja").render(
         format=FORMAT,
         version=VERSION,
         coarsest=COARSEST,
@@ -48,6 +49,7 @@ def component(scene: Scene, options: Options) -> str:
         width=DATA_WIDTH,
         **_shader_parts(list(forms.values())),
     )
+    return Exported(text)
 
 
 def _formulas(variants: Iterable[Variant]) -> Iterable[str]:

@@ -1,51 +1,54 @@
-"""What a user may choose about an export."""
+"""What a user may choose about an export, and which scenes an exporter then takes."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
+from typing import Annotated
 
-from ..blend import FRAMINGS
-from ..errors import Sdf2vecError
+from msgspec import Struct
+
+from ..blend import COMPOSITING, FRAMINGS
+from ..declared import choice, number, plain
+from ..scene import Scene
 
 GLSL_VERSIONS = {"es300": "300 es", "330": "330", "es100": "100"}
 LAYOUTS = ("auto", "readable", "table", "tiled", "packed", "data")
 SVG_PROFILES = ("filters", "portable")
 
 
+Size = Annotated[int, number("size in pixels", "PIXELS", 1, 16384, "shortest side of a PNG")]
+SizeLimit = Annotated[
+    int, number("SVG size limit in bytes", "BYTES", 1, None, "draw an SVG coarser where it would be larger")
+]
+
+
+class Options(Struct, frozen=True, kw_only=True):
+    """What a user may choose about an export; `declared.checked` makes one of values that may be wrong."""
+
+    size: Size | None = None
+    glsl: Annotated[str, choice("GLSL version", "version of the GLSL", GLSL_VERSIONS)] = "es300"
+    layout: Annotated[str, choice("layout", "how shaders hold shapes", LAYOUTS)] = "auto"
+    framing: Annotated[str, choice("framing", "how shaders fill a canvas of another shape", FRAMINGS)] = "fit"
+    animate: Annotated[bool, plain("the shapes of a Shadertoy breathe")] = False
+    svg_profile: Annotated[
+        str, choice("SVG profile", "with blur filters, or without, for every renderer", SVG_PROFILES)
+    ] = SVG_PROFILES[0]
+    svg_size_limit: SizeLimit | None = None
+    title: Annotated[str, plain("what an export calls the picture")] = "a picture"
+    alone: Annotated[bool, plain("no files beside the text")] = False
+    original: Annotated[bytes | None, plain("PNG or JPEG that a page compares with")] = None
+
+
 @dataclass(frozen=True)
-class Options:
-    """`size`: shortest side of a PNG in pixels, None for the scene's own. `glsl`: key of GLSL_VERSIONS.
+class Accepts:
+    """Which scenes an exporter takes: of these compositings, additive ones perhaps on an opaque ground only."""
 
-    `layout`: how a shader holds its shapes, "auto" picks; see `sdf2vec.export.layouts`. `framing`: "fit" or
-    "cover", what a shader does on a canvas of another shape. `animate`: shapes of a Shadertoy breathe.
-    `alone`: no files beside the text. `original`: PNG or JPEG that a page compares with.
-    `title` is named in the header. `svg_profile`: "filters" may use blur filters and blend modes, "portable"
-    neither. `svg_size_limit`: the most bytes that an SVG may have, None for as many as it takes to look like the
-    render. Raises Sdf2vecError for an unknown name or an impossible size.
-    """
+    compositing: tuple[str, ...] = field(default_factory=lambda: tuple(COMPOSITING))
+    additive_needs_ground: bool = False
 
-    size: int | None = None
-    glsl: str = "es300"
-    layout: str = "auto"
-    title: str = "a picture"
-    svg_profile: str = "filters"
-    svg_size_limit: int | None = None
-    framing: str = "fit"
-    animate: bool = False
-    alone: bool = False
-    original: bytes | None = None
-
-    def __post_init__(self) -> None:
-        _check("GLSL version", self.glsl, tuple(GLSL_VERSIONS))
-        _check("layout", self.layout, LAYOUTS)
-        _check("framing", self.framing, tuple(FRAMINGS))
-        if self.size is not None and not 1 <= self.size <= 16384:
-            raise Sdf2vecError(f"size must be between 1 and 16384 pixels, got {self.size}")
-        _check("SVG profile", self.svg_profile, SVG_PROFILES)
-        if self.svg_size_limit is not None and self.svg_size_limit < 1:
-            raise Sdf2vecError(f"the SVG size limit must be at least 1 byte, got {self.svg_size_limit}")
-
-
-def _check(what: str, value: str, known: tuple[str, ...]) -> None:
-    if value not in known:
-        raise Sdf2vecError(f"unknown {what} {value!r}; choose from {', '.join(known)}")
+    def refusal(self, scene: Scene) -> str:
+        """Why a scene is not taken; empty where it is."""
+        if scene.compositing not in self.compositing:
+            return "without blend modes"
+        transparent = scene.compositing == "additive" and scene.background is None
+        return "on a transparent ground" if transparent and self.additive_needs_ground else ""

@@ -4,14 +4,15 @@ from __future__ import annotations
 
 import base64
 import json
-from dataclasses import replace
 
 import numpy as np
+from msgspec.structs import replace
 
 from ..errors import Sdf2vecError
 from ..files import one_line
 from ..scene import Scene
 from ..templating import template
+from .exported import Exported
 from .options import Options
 from .raster import png
 from .shader import DATA_WIDTH, Shader, shader
@@ -20,14 +21,14 @@ from .svg import svg
 LABELS = {"shadertoy": "Shadertoy", "glsl": "GLSL", "wgsl": "WGSL", "svg": "SVG"}
 
 
-def html(scene: Scene, options: Options) -> str:
+def html(scene: Scene, options: Options) -> Exported:
     """A page that needs no network, with buttons that copy the scene in other forms."""
     plain = Options(title=options.title)
     made = shader(scene, "glsl", replace(plain, layout="data"))
     alone = replace(plain, alone=True)
     texts = {name: shader(scene, name, alone).text for name in ("shadertoy", "glsl", "wgsl")}
     drawing = _drawing(scene, plain)
-    return template("page.html.jinja").render(
+    text = template("page.html.jinja").render(
         scene=scene,
         title=one_line(options.title),
         fallback=drawing or _image(scene, plain),
@@ -37,12 +38,13 @@ def html(scene: Scene, options: Options) -> str:
         data=base64.b64encode(_floats(made)).decode(),
         width=DATA_WIDTH,
     )
+    return Exported(text)
 
 
 def _drawing(scene: Scene, options: Options) -> str:
     """The SVG as part of a page, or nothing where no drawing can show the scene."""
     try:
-        drawing = svg(scene, options)
+        drawing = str(svg(scene, options).data)
     except Sdf2vecError:
         return ""
     return drawing[drawing.index("<svg") :].strip()
@@ -54,7 +56,7 @@ def _floats(made: Shader) -> bytes:
 
 
 def _image(scene: Scene, options: Options) -> str:
-    return f'<img src="{_data_url(png(scene, options))}" alt="">'
+    return f'<img src="{_data_url(png(scene, options).raw)}" alt="">'
 
 
 def _data_url(data: bytes) -> str:

@@ -5,7 +5,6 @@ from __future__ import annotations
 import base64
 from collections.abc import Iterable
 from dataclasses import dataclass, replace
-from functools import lru_cache
 from typing import Any
 
 import numpy as np
@@ -20,6 +19,7 @@ from ..paints import FLAT
 from ..scene import Layer, Scene
 from ..templating import template
 from . import packing
+from .exported import Exported
 from .layouts import (
     EMBEDDED,
     FILE,
@@ -86,7 +86,13 @@ class Shader:
         return line
 
 
-@lru_cache(maxsize=16)
+def exported(scene: Scene, options: Options, name: str, suffix: str) -> Exported:
+    """A scene as a shader, with its data beside it. Raises Sdf2vecError for a layout that the target can't hold."""
+    made = shader(scene, name, options)
+    beside = {} if TARGETS[name].host is EMBEDDED else files_beside(made, suffix)
+    return Exported(made.text, beside, (made.about,), made.error)
+
+
 def shader(scene: Scene, name: str, options: Options) -> Shader:
     """A scene as a shader: `name` is a key of TARGETS. Raises Sdf2vecError for a layout that the target can't hold."""
     target = TARGETS[name]

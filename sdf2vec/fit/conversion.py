@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from functools import lru_cache
 
 import numpy as np
 
@@ -21,7 +20,6 @@ SIDE = 96  # shortest side on which the first colours are looked at
 OPACITY = 0.9
 
 
-@lru_cache(maxsize=4)
 def over_of(scene: Scene) -> tuple[Scene, float]:
     """A scene under `over` with as many shapes that looks like an additive one, and how near it is in dB."""
     if not scene.layers:

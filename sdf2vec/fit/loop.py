@@ -27,7 +27,8 @@ from .growth import densify, exchange, importance, prune, relocate
 from .initialization import Layers, background_of, empty_groups, place
 from .losses import Objective, objective
 from .presets import CROWDING, MANY, Phase, Start
-from .settings import Settings, preset_of, weights_for
+from .settings import Settings, preset_of
+from .weights import weights_for
 
 THICKEN_EVERY = 10  # steps
 AREA_WEIGHT = 1.0  # of the area constraint in the loss
@@ -247,7 +248,7 @@ class Fit:
     def _restrict_colors(self, stage: Stage) -> None:
         """To the palette given or, of so many colours, the best."""
         cover = importance(self._draw(self.tensors, stage.target), self.tensors, self.generator)
-        restrict_colors(self.tensors, cover, self.settings.palette, self.settings.colors, self.generator)
+        restrict_colors(self.tensors, cover, self.settings.palette, self.settings.colors or 0, self.generator)
 
     def _refit(self, stage: Stage) -> None:
         """Trains all but the colours."""
@@ -280,7 +281,7 @@ class Fit:
 
 
 def _layers_of(settings: Settings) -> Layers:
-    return Layers(settings.kinds, settings.compositing, settings.union, settings.paint)
+    return Layers(settings.kind, settings.compositing, settings.union, settings.paint)
 
 
 def _check_start(scene: Scene, size: tuple[float, float]) -> None:

@@ -5,18 +5,17 @@ from __future__ import annotations
 import math
 import os
 import re
-from collections.abc import Iterable, Sequence
-from dataclasses import dataclass, field, replace
-from typing import Any
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import replace
+from typing import Annotated, Any
 
-import numpy as np
-from numpy.typing import NDArray
+from msgspec import Struct, structs
 
 from ..blend import COMPOSITING
+from ..declared import check_choice, checked, choice, number, plain
+from ..deferred import deferred
 from ..errors import Sdf2vecError
-from ..image import load as load_picture
-from ..image import resize
-from ..paints import FLAT
+from ..paints import FLAT, PAINTS
 from ..scene import MAX_JOINED, MAX_SHAPES, Color, Scene
 from ..scene import load as load_scene
 from ..shapes import KINDS
@@ -26,38 +25,60 @@ MIXED = "mixed"
 LOSS_NAMES = ("l1", "mse", "ssim", "flip")
 DEVICES = ("auto", "cpu", "cuda", "mps")
 MOST_COLORS = 256
-SHAPES = 256  # when nobody says how many
 LARGEST_AREA = 0.1  # share of the canvas
 
 
-@dataclass(frozen=True)
-class Settings:
-    """What to fit and how.
+Shapes = Annotated[
+    int, number("number of shapes", "N", 1, MAX_SHAPES, "how many shapes, or as many as the start has")
+]
+Seed = Annotated[int, number("seed", "S", 0, 2**63 - 1, "the same seed gives the same scene")]
+Union = Annotated[
+    int, number("number of shapes joined (union)", "K", 1, MAX_JOINED, "join K shapes smoothly in each layer")
+]
+MinArea = Annotated[
+    float, number("least area (share of the canvas)", "SHARE", 0, LARGEST_AREA, "least area, of the canvas")
+]
+MaxFalloff = Annotated[
+    float,
+    number(
+        "largest falloff (share of the shortest side)",
+        "SHARE",
+        0,
+        SOFTEST,
+        "softest edge, of the shortest side: 0 for sharp shapes",
+    ),
+]
+Trials = Annotated[
+    int, number("number of trials", "T", 0, 10_000, "try a few shapes elsewhere at the end, T times")
+]
+Colors = Annotated[int, number("number of colours", "K", 1, MOST_COLORS, "how many colours there may be")]
 
-    `kinds`: names in `shapes.KINDS`; `union`: shapes joined in each layer; `loss`: replaces the preset's, when given;
-    `least_area`: of a shape, in shares of the canvas, None leaves it to the preset; `softest`: the largest falloff, in
-    scene units, 0 for sharp edges only, None leaves it to the preset; `start`: a scene to go on from, at any size;
-    `trials`: how often a few layers are tried elsewhere at the end; `palette`: the only colours there may be; `colors`:
-    how many there may be where no palette is given, 0 for any; `weights`: how much an error matters, 0..1, [H, W];
-    `device`: auto, cpu, cuda or mps.
-    """
 
-    shapes: int = 256
-    kinds: tuple[str, ...] = ("triangle",)
-    compositing: str = "over"
-    preset: str = DEFAULT
-    loss: Loss | None = None
-    seed: int = 0
-    device: str = "auto"
-    union: int = 1
-    least_area: float | None = None
-    softest: float | None = None
-    start: Scene | None = None
-    trials: int = 0
-    palette: tuple[Color, ...] = ()
-    colors: int = 0
-    weights: NDArray[np.float32] | None = field(default=None, compare=False)
-    paint: str = FLAT
+class Settings(Struct, frozen=True):
+    """What to fit and how: the options of a fit, read. `weights`: how much an error matters, 0..1, [H, W]."""
+
+    shapes: Shapes = 256
+    kind: Annotated[
+        tuple[str, ...], choice("kind", "which shapes, one kind or several: box,circle", (*KINDS, MIXED))
+    ] = ("triangle",)
+    compositing: Annotated[str, choice("compositing", "how shapes lie on each other", COMPOSITING)] = "over"
+    preset: Annotated[str, choice("preset", "how long to fit, and in which steps", PRESETS)] = DEFAULT
+    loss: Annotated[
+        Loss | None, choice("loss", "instead of the preset's, one or several: l1:0.8,ssim:0.2", LOSS_NAMES)
+    ] = None
+    seed: Seed = 0
+    device: Annotated[str, choice("device", "where to fit; auto takes CUDA if it works", DEVICES)] = "auto"
+    union: Union = 1
+    paint: Annotated[str, choice("paint", "what a shape's colour does across it", PAINTS)] = FLAT
+    min_area: MinArea | None = None
+    max_falloff: MaxFalloff | None = None
+    start: Annotated[Scene | None, plain("a scene, or its file, to go on from, at any size", "SCENE")] = None
+    trials: Trials = 0
+    palette: Annotated[
+        tuple[Color, ...], plain('the only colours there may be: "#123,#a0b1c2"', "COLORS")
+    ] = ()
+    colors: Colors | None = None
+    weights: Annotated[Any, plain("a picture that is bright where errors matter", "MASK")] = None
 
 
 def preset_of(settings: Settings) -> Preset:
@@ -67,63 +88,39 @@ def preset_of(settings: Settings) -> Preset:
         raise Sdf2vecError(f"the preset {settings.preset} is for --compositing {preset.compositing}")
     if settings.loss is not None:
         preset = replace(preset, phases=tuple(replace(p, loss=settings.loss) for p in preset.phases))
-    if settings.least_area is not None:
-        preset = replace(preset, least_area=settings.least_area)
-    if settings.softest is not None:
+    if settings.min_area is not None:
+        preset = replace(preset, least_area=settings.min_area)
+    if settings.max_falloff is not None:
         low, high = preset.falloff
-        preset = replace(preset, falloff=(min(low, settings.softest), min(high, settings.softest)))
+        preset = replace(preset, falloff=(min(low, settings.max_falloff), min(high, settings.max_falloff)))
     return preset
 
 
-def settings_of(
-    shapes: int | None = None,
-    *,
-    kind: str | Sequence[str] = "triangle",
-    compositing: str | None = None,
-    preset: str = DEFAULT,
-    loss: str | Sequence[tuple[str, float]] | None = None,
-    seed: int = 0,
-    device: str = "auto",
-    union: int = 1,
-    min_area: float | None = None,
-    max_falloff: float | None = None,
-    start: Any = None,
-    trials: int = 0,
-    palette: str | Sequence[Color | str] | None = None,
-    colors: int | None = None,
-    weights: Any = None,
-) -> Settings:
+def settings_of(shapes: int | None = None, *, compositing: str | None = None, **options: Any) -> Settings:
     """The settings of a fit in the words of the user (see `api.fit`). Raises Sdf2vecError for the first bad one."""
-    kinds = kinds_of(kind)
-    check_choice("preset", preset, tuple(PRESETS))
-    check_choice("device", device, DEVICES)
-    _check_whole("seed", seed, 0, 2**63 - 1)
-    _check_whole("number of shapes joined (union)", union, 1, MAX_JOINED)
-    _check_whole("number of trials", trials, 0, 10_000)
-    scene = _scene_of(start)
-    shapes = _count_of(shapes, scene)
+    given = {name: READERS[name](value) if name in READERS else value for name, value in options.items()}
+    start: Scene | None = given.get("start")
+    count = shapes if shapes is not None or start is None else start.shape_count or None
+    asked = {"shapes": count, "compositing": compositing}
+    settings = checked(Settings, given | {name: value for name, value in asked.items() if value is not None})
+    if start is not None and compositing not in (None, start.compositing):
+        raise Sdf2vecError(f"the start scene is {start.compositing}, not {compositing}")
+    needed = start.compositing if start is not None else PRESETS[settings.preset].compositing
+    settings = structs.replace(settings, compositing=compositing or needed or settings.compositing)
+    _check_together(settings)
+    return settings
+
+
+def _check_together(settings: Settings) -> None:
+    """Raises Sdf2vecError for settings that don't go with each other."""
+    shapes, union = settings.shapes, settings.union
     if shapes % union:
         raise Sdf2vecError(f"{shapes} shapes can't be joined by {union}: choose a multiple of {union}")
-    settings = Settings(
-        shapes,
-        kinds,
-        _compositing(compositing, preset, scene),
-        preset,
-        losses_of(loss),
-        int(seed),
-        device,
-        int(union),
-        _share_of(min_area, "least area", "canvas", LARGEST_AREA),
-        _share_of(max_falloff, "largest falloff", "shortest side", SOFTEST),
-        scene,
-        int(trials),
-        *_colors(palette, colors),
-        weights_of(weights),
-    )
     preset_of(settings)
+    if settings.palette and settings.colors:
+        raise Sdf2vecError("either a palette or a number of colours, not both")
     if settings.compositing != "over" and (settings.palette or settings.colors):
         raise Sdf2vecError("a palette needs --compositing over: additive colours mix")
-    return settings
 
 
 def _scene_of(start: Any) -> Scene | None:
@@ -132,23 +129,6 @@ def _scene_of(start: Any) -> Scene | None:
     if not isinstance(start, str | os.PathLike):
         raise Sdf2vecError(f"the start is a scene or the path of its file, got {type(start).__name__}")
     return load_scene(start)
-
-
-def _count_of(shapes: int | None, start: Scene | None) -> int:
-    if shapes is None:
-        return start.shape_count if start is not None and start.shape_count else SHAPES
-    _check_whole("number of shapes", shapes, 1, MAX_SHAPES)
-    return int(shapes)
-
-
-def _share_of(value: Any, what: str, whole: str, most: float) -> float | None:
-    """A share of something, None for None. Raises Sdf2vecError for what is out of range or no number."""
-    try:
-        if value is None or 0 <= value <= most:
-            return value if value is None else float(value)
-    except (TypeError, ValueError):
-        pass
-    raise Sdf2vecError(f"the {what} must be a share of the {whole} up to {most}, got {value!r}")
 
 
 def _listed(what: str, value: Any) -> list[Any]:
@@ -160,28 +140,10 @@ def _listed(what: str, value: Any) -> list[Any]:
     return list(value)
 
 
-def _compositing(asked: str | None, preset: str, start: Scene | None) -> str:
-    """What was asked for, or what the start scene or the preset needs, or over."""
-    if asked is not None:
-        check_choice("compositing", asked, tuple(COMPOSITING))
-    if start is not None and asked not in (None, start.compositing):
-        raise Sdf2vecError(f"the start scene is {start.compositing}, not {asked}")
-    return (
-        asked or (start.compositing if start is not None else None) or PRESETS[preset].compositing or "over"
-    )
-
-
-def _colors(palette: str | Sequence[Color | str] | None, count: int | None) -> tuple[tuple[Color, ...], int]:
-    if palette is not None and count is not None:
-        raise Sdf2vecError("either a palette or a number of colours, not both")
-    if count is not None:
-        _check_whole("number of colours", count, 1, MOST_COLORS)
-        return (), int(count)
-    return (palette_of(palette) if palette is not None else ()), 0
-
-
-def palette_of(palette: str | Sequence[Color | str]) -> tuple[Color, ...]:
+def palette_of(palette: str | Sequence[Color | str] | None) -> tuple[Color, ...]:
     """Colours 0..1 from "#123,#a0b1c2" or from tuples. Raises Sdf2vecError for what is no colour."""
+    if palette is None:
+        return ()
     parts = (
         [part.strip() for part in palette.split(",")]
         if isinstance(palette, str)
@@ -208,32 +170,17 @@ def _color(part: str | Color) -> Color:
     return red, green, blue
 
 
-def weights_of(source: Any) -> NDArray[np.float32] | None:
-    """How much an error matters, 0..1, [H, W]: a picture's mean channel, less where it is transparent."""
-    if source is None:
-        return None
-    pixels = load_picture(source).pixels
-    weights: NDArray[np.float32] = pixels[..., :3].mean(axis=2, dtype=np.float32)
-    if pixels.shape[2] == 4:
-        weights = weights * pixels[..., 3]
-    if weights.max() == 0:
-        raise Sdf2vecError("the weights are black all over: nothing would matter")
-    return weights
-
-
-def weights_for(weights: NDArray[np.float32], width: int, height: int) -> NDArray[np.float32]:
-    """Weights [H, W] at a picture's size, [height, width]."""
-    return np.ascontiguousarray(resize(np.repeat(weights[..., None], 3, axis=2), width, height)[..., 0])
-
-
 def kinds_of(kind: str | Sequence[str]) -> tuple[str, ...]:
-    """Names of kinds from one name, several, or "mixed". Raises Sdf2vecError for an unknown one."""
-    names = _listed("kind", kind)
+    """Names of kinds from a text like "box,circle", from several names, or "mixed" for all with an edge. Raises Sdf2vecError for an
+    unknown one."""
+    names = [part.strip() for text in _listed("kind", kind) for part in str(text).split(",") if part.strip()]
     for name in names:
         check_choice("kind", name, (*KINDS, MIXED))
     if not names:
         raise Sdf2vecError("at least one kind of shape is needed")
-    return tuple(kind for kind in KINDS if kind in names or MIXED in names)
+    return tuple(
+        name for name, kind in KINDS.items() if name in names or (MIXED in names and kind.patch is None)
+    )
 
 
 def losses_of(loss: str | Sequence[tuple[str, float]] | None) -> Loss | None:
@@ -270,12 +217,10 @@ def _name_and_weight(text: str) -> tuple[str, str]:
     return name.strip(), weight if colon else "1"
 
 
-def _check_whole(what: str, value: Any, low: int, high: int) -> None:
-    if isinstance(value, bool) or not hasattr(value, "__index__") or not low <= value <= high:
-        raise Sdf2vecError(f"the {what} must be a whole number between {low} and {high}, got {value}")
-
-
-def check_choice(what: str, value: str, known: Sequence[str]) -> None:
-    """Raises Sdf2vecError for an unknown name."""
-    if value not in known:
-        raise Sdf2vecError(f"unknown {what} {value!r}; choose from {', '.join(known)}")
+READERS: dict[str, Callable[[Any], Any]] = {
+    "kind": kinds_of,
+    "loss": losses_of,
+    "start": _scene_of,
+    "palette": palette_of,
+    "weights": deferred("sdf2vec.fit.weights", "weights_of"),
+}

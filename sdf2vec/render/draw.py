@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+import numpy as np
 import torch
+from numpy.typing import NDArray
 
+from ..image import unpremultiply
 from ..scene import Scene
 from . import fused, reference
 from .tensors import SceneTensors, from_scene
@@ -20,6 +23,12 @@ def draw(scene: Scene, width: int | None = None, height: int | None = None) -> t
     if is_large(scene, width, height):
         return _drawn_fused(from_scene(scene), width, height)
     return reference.render(scene, width, height)
+
+
+def pixels_of(scene: Scene, width: int | None = None, height: int | None = None) -> NDArray[np.float32]:
+    """The scene as an array [height, width, 3], or [.., 4] with straight alpha when it is transparent; 0..1."""
+    pixels: NDArray[np.float32] = draw(scene, width, height).permute(1, 2, 0).numpy()
+    return np.ascontiguousarray(pixels[..., :3]) if scene.background else unpremultiply(pixels)
 
 
 def is_large(scene: Scene, width: int, height: int) -> bool:

@@ -10,17 +10,22 @@ from functools import lru_cache
 from typing import NamedTuple
 
 import numpy as np
+from msgspec import structs
 
+from ...deferred import deferred
 from ...errors import Sdf2vecError
 from ...files import one_line
 from ...scene import Scene
-from ..options import Options
+from ..exported import Exported
+from ..options import Accepts, Options
 from .canvas import Canvas, Document, color_text, tag
 from .compensate import compensated
 from .field import extent
 from .layers import Detail, Painter, Part, is_banded, is_soft, plan
 from .lean import GRAINS, GROUP
 from .sums import Term, alternating, terms
+
+_svg2pdf = deferred("cairosvg", "svg2pdf")
 
 PORTABLE = "portable"
 CREATED = re.compile(rb"(/CreationDate \(D:)([^)]*)")
@@ -46,48 +51,42 @@ class Written(NamedTuple):
     notes: tuple[str, ...]
 
 
-def svg(scene: Scene, options: Options) -> str:
+def accepts(options: Options) -> Accepts:
+    """Sums need blend modes, and a ground to be added to."""
+    return Accepts(("over",) if options.svg_profile == PORTABLE else ("over", "additive"), True)
+
+
+def svg(scene: Scene, options: Options) -> Exported:
     """The scene as SVG text in pixels of the fitted picture.
 
-    An additive scene that the profile or a transparent ground can't hold is fitted again under `over` (`notes` says
-    how near that is). Raises Sdf2vecError for a size limit that can't be met.
+    Raises Sdf2vecError for a scene that is not accepted, and for a size limit that can't be met.
     """
-    return _written(scene, options).document.text(one_line(options.title))
+    refusal = accepts(options).refusal(scene)
+    if refusal:
+        raise Sdf2vecError(f"svg: nothing can be added up {refusal}")
+    written = _written(scene, options)
+    return Exported(written.document.text(one_line(options.title)), notes=written.notes)
 
 
-def notes(scene: Scene, options: Options) -> tuple[str, ...]:
-    """What the SVG of a scene gave up, a line each."""
-    return _written(scene, options).notes
-
-
-def pdf_notes(scene: Scene, options: Options) -> tuple[str, ...]:
-    """What the PDF of a scene gave up, a line each."""
-    return notes(scene, replace(options, svg_profile=PORTABLE))
-
-
-def data_uri(scene: Scene, options: Options) -> str:
+def data_uri(scene: Scene, options: Options) -> Exported:
     """The SVG as a data URI, for `src` and `url()`; base64, which every parser takes."""
-    return "data:image/svg+xml;base64," + base64.b64encode(svg(scene, options).encode()).decode()
+    made = svg(scene, options)
+    return replace(made, data="data:image/svg+xml;base64," + base64.b64encode(made.raw).decode())
 
 
-def pdf(scene: Scene, options: Options) -> bytes:
+def pdf(scene: Scene, options: Options) -> Exported:
     """The portable SVG as PDF, by CairoSVG. Raises Sdf2vecError where cairo is not installed."""
-
-    text = svg(scene, replace(options, svg_profile=PORTABLE))
+    made = svg(scene, structs.replace(options, svg_profile=PORTABLE))
     try:
-        import cairosvg
+        drawn = bytes(_svg2pdf(bytestring=made.raw))
     except OSError:  # the package is there, the system's library is not
         raise Sdf2vecError("pdf: needs cairo: apt-get install libcairo2") from None
-    made = bytes(cairosvg.svg2pdf(bytestring=text.encode()))
-    return CREATED.sub(lambda found: found[1] + b"0" * len(found[2]), made)  # the same scene, the same file
+    same = CREATED.sub(lambda found: found[1] + b"0" * len(found[2]), drawn)  # the same scene, the same file
+    return replace(made, data=same)
 
 
 def _written(scene: Scene, options: Options) -> Written:
     """The finest drawing that keeps to the size limit."""
-    if scene.compositing == "additive" and (options.svg_profile == PORTABLE or scene.background is None):
-        found, note = _without_sums(scene, options.svg_profile)
-        written = _written(found, options)
-        return Written(written.document, (note, *written.notes))
     title, limit = one_line(options.title), options.svg_size_limit
     if limit is None:
         return _drawing(scene, options.svg_profile, DETAILS[0])
@@ -151,16 +150,6 @@ def _drawing(scene: Scene, profile: str, detail: Detail) -> Written:
         elements = [element for element in drawn if element]
         document.body += [tag("g", "\n".join(elements), **GROUP)] if grain and elements else elements
     return Written(document, found)
-
-
-def _without_sums(scene: Scene, profile: str) -> tuple[Scene, str]:
-    """An additive scene fitted again under `over`, and what a user should know about that."""
-    from ...fit.conversion import over_of
-
-    found, decibels = over_of(scene)
-    why = "without blend modes" if profile == PORTABLE else "on a transparent ground"
-    near = f" ({decibels:.1f} dB from its render)" if scene.layers else ""
-    return found, f"svg: nothing can be added up {why}: fitted again under over{near}"
 
 
 def _add_terms(scene: Scene, document: Document, painter: Painter) -> tuple[str, ...]:

@@ -1,0 +1,96 @@
+"""What needs a web page to be seen, drawn by Chromium: the page itself, an image's address, an element, a material.
+
+Each function draws into `width` × `height` pixels and returns float32 `[height, width, 4]` in 0..1 with straight alpha.
+"""
+
+import math
+import os
+import sys
+from pathlib import Path
+
+from playwright.sync_api import Page
+
+from sdf2vec.engines.chromium import opened, probe, screenshot
+from sdf2vec.engines.engine import EngineError, Picture
+
+__all__ = ["element", "image", "material", "page", "probe", "probe_three"]
+
+MARGIN = 32  # pixels at both sides of the picture on the page
+SHARE = 0.85  # of the window's height that the picture may take
+
+IMAGE = """<!DOCTYPE html><style>*{{margin:0}}img{{display:block;width:100vw;height:100vh}}</style>
+<img src="{address}" alt="">"""
+
+ELEMENT = """<!DOCTYPE html><style>*{margin:0}</style><script type="module" src="sdf-image.js"></script>
+<sdf-image src="picture.scene.json" alt="A picture"><p>Not drawn</p></sdf-image>"""
+
+MATERIAL = """<!DOCTYPE html><style>*{{margin:0}}canvas{{display:block}}</style><script type="module">
+import * as THREE from "./three.module.min.js";
+import {{ createMaterial, aspect }} from "./material.js";
+const renderer = new THREE.WebGLRenderer({{ antialias: false, alpha: true }});
+renderer.setSize({width}, {height});
+document.body.append(renderer.domElement);
+const scene = new THREE.Scene();
+scene.add(new THREE.Mesh(new THREE.PlaneGeometry(aspect, 1), createMaterial(THREE)));
+renderer.render(scene, new THREE.OrthographicCamera(-aspect / 2, aspect / 2, 0.5, -0.5, -1, 1));
+document.title = "drawn";
+</script>"""
+
+TWO_FRAMES = "new Promise((done) => requestAnimationFrame(() => requestAnimationFrame(done)))"
+
+
+def page(html: str, width: int, height: int) -> Picture:
+    """The picture on the page that `sdf2vec.export.page` makes."""
+    window = width + MARGIN, math.ceil((height + 1) / SHARE)
+    with opened({"index.html": html}, *window) as shown:
+        canvas = "document.querySelector('canvas')"
+        _wait_for(shown, canvas, width, height)
+        return screenshot(shown, "canvas")[:height, :width]  # a fractional box is rounded up
+
+
+def image(address: str, width: int, height: int) -> Picture:
+    """What an `<img>` with this address shows."""
+    with opened({"index.html": IMAGE.format(address=address)}, width, height) as shown:
+        return screenshot(shown)
+
+
+def element(module: str, width: int, height: int, scene: str) -> Picture:
+    """A scene file in the element that a module defines."""
+    files = {"index.html": ELEMENT, "sdf-image.js": module, "picture.scene.json": scene}
+    with opened(files, width, height) as shown:
+        _wait_for(
+            shown, "document.querySelector('sdf-image').shadowRoot?.querySelector('canvas')", width, height
+        )
+        return screenshot(shown, "sdf-image")[:height, :width]
+
+
+def material(module: str, width: int, height: int) -> Picture:
+    """A rectangle with the three.js material that a module makes."""
+    html = MATERIAL.format(width=width, height=height)
+    with opened({"index.html": html, "material.js": module, **_three_modules()}, width, height) as shown:
+        shown.wait_for_function("document.title === 'drawn'")
+        shown.evaluate(TWO_FRAMES)
+        return screenshot(shown, "canvas")
+
+
+def _wait_for(shown: Page, canvas: str, width: int, height: int) -> None:
+    """Until a canvas has its size, and is painted."""
+    shown.wait_for_function(
+        f"([w, h]) => {{ const c = {canvas}; return c?.width === w && Math.abs(c.height - h) < 2 }}",
+        arg=[width, height],
+    )
+    shown.evaluate(TWO_FRAMES)
+
+
+def probe_three() -> None:
+    """Raises where the browser does not start or three.js is not here."""
+    probe()
+    if not _three_modules():
+        raise EngineError("three.js is not here: make engines")
+
+
+def _three_modules() -> dict[str, str | bytes]:
+    """The modules of three.js by name; SDF2VEC_THREE names another folder than where `make engines` puts them."""
+    named = os.environ.get("SDF2VEC_THREE")
+    folder = Path(named) if named else Path(sys.prefix, "npm", "node_modules", "three", "build")
+    return {path.name: path.read_text() for path in folder.glob("three.*.min.js")}

@@ -1,0 +1,38 @@
+"""How near a scene's render comes to a picture."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+import torch
+
+from .fit.loop import scaled
+from .flip import flip
+from .image import Picture, premultiply
+from .metrics import psnr
+from .render.draw import draw_fast
+from .scene import Scene
+
+FLIP_RESOLUTION = 1000  # FLIP takes long: pictures of more pixels than the square are scaled down for it
+
+
+class Quality(NamedTuple):
+    """How near a scene's render comes to a picture."""
+
+    psnr: float  # dB
+    flip: float
+    flip_size: tuple[int, int]  # width and height in pixels at which FLIP was computed
+
+
+def quality(scene: Scene, picture: Picture) -> Quality:
+    """PSNR and mean FLIP of the scene's render against the picture, premultiplied.
+
+    FLIP is that of both scaled down to about a million pixels, where they have more.
+    """
+    pixels = premultiply(picture.pixels) if picture.has_alpha else picture.pixels
+    drawn = draw_fast(scene, picture.width, picture.height)[: pixels.shape[2]]
+    target = torch.from_numpy(np.ascontiguousarray(pixels.transpose(2, 0, 1)))
+    small = [scaled(planes.permute(1, 2, 0).numpy(), FLIP_RESOLUTION) for planes in (drawn, target)]
+    height, width = small[0].shape[1:]
+    return Quality(float(psnr(drawn, target)), float(flip(*small)), (width, height))
