@@ -16,11 +16,11 @@ from ...files import one_line
 from ...scene import Scene
 from ..options import Options
 from .canvas import Canvas, Document, color_text, tag
-from .compensate import compensated
-from .field import extent
+from .compact import GRAINS, GROUP
+from .difference_blend import Term, alternating, terms
 from .layers import Detail, Painter, Part, is_banded, is_soft, plan
-from .lean import GRAINS, GROUP
-from .sums import Term, alternating, terms
+from .refit_appearance import compensated
+from .sampling import extent
 
 PORTABLE = "portable"
 CREATED = re.compile(rb"(/CreationDate \(D:)([^)]*)")

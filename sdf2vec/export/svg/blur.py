@@ -18,10 +18,10 @@ from numpy.typing import NDArray
 
 from ...scene import Layer
 from ...shapes import KINDS, Outline
-from .bands import contours
-from .compensate import Difference
-from .field import Array, Grid, covers, distances, extent, grid_over
+from .isobands import contours
 from .outlines import Traced, core, distance_to, sharpened
+from .refit_appearance import Difference
+from .sampling import Array, Grid, covers, distances, extent, grid_over
 
 GAUSSIAN = math.pi / math.sqrt(3.0) / 10.0  # standard deviation of the edge's logistic profile, in falloffs
 SHARES = (1.0, 0.7, 0.45, 0.2)  # of the corner radius that an offset outline has

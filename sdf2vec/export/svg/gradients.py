@@ -20,8 +20,8 @@ from ...blend import REACH
 from ...scene import Color
 from ...shapes import EllipseOutline
 from .canvas import Canvas, Document, Points, color_text, number, opacity_text, tag, url
+from .gradient_stops import SOFT, edge_stops, stop_elements
 from .outlines import convex, sides, turn
-from .stops import SOFT, edge_stops, stop_elements
 
 LIFT = -0.3  # 8-bit levels: resvg and Firefox gain half a level at a gradient, the others nothing
 WIDEST = math.radians(60.0)  # of a circular sector drawn as a triangle

@@ -9,18 +9,18 @@ import numpy as np
 
 from ...scene import Layer, Scene
 from ...shapes import KINDS, EllipseOutline, Outline
-from .bands import band_count, band_levels, layer_contours
+from .bezier_fit import path_data, polygon_data
 from .blur import Blurred, best_blur
 from .canvas import Canvas, Document, Points, color_text, opacity_text, tag, url
-from .curves import path_data, polygon_data
-from .field import Array, extent
+from .compact import Grain, lean, lean_blur, softnesses
+from .gradient_stops import stop_count
 from .gradients import Paint, ellipse, sliced
-from .lean import Grain, lean, lean_blur, softnesses
+from .isobands import band_count, band_levels, layer_contours
 from .outlines import TOLERANCE, core, element, upright
-from .pieces import piece_contours
-from .shading import fill_of, is_mixed
-from .stops import stop_count
-from .weigh import contrasts
+from .sampling import Array, extent
+from .union_gradient import fill_of, is_mixed
+from .union_partition import piece_contours
+from .visibility import contrasts
 
 SHARP = 2.0  # pixels: an edge softer than this is drawn soft
 SMALL = 64.0  # pixels along the shortest side: a picture smaller than this will be shown larger

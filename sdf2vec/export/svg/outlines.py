@@ -9,9 +9,9 @@ from functools import singledispatch
 import numpy as np
 
 from ...shapes import EllipseOutline, Outline, PolygonOutline, RectangleOutline
+from .bezier_fit import path_data
 from .canvas import Canvas, Points, tag
-from .curves import path_data
-from .field import Array, Grid
+from .sampling import Array, Grid
 
 FLAT = 1e-9  # scene units: a side shorter than this is none
 LONGEST_MITRE = 4.0  # in lengths that the sides are moved by

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...scene import Scene
-from .field import Array
+from .sampling import Array
 
 Float = TypeVar("Float", np.float32, np.float64)
 

@@ -13,8 +13,8 @@ from typing import NamedTuple
 import numpy as np
 
 from ...scene import Color, Layer, Scene
-from .field import Array
-from .weigh import layers_at
+from .sampling import Array
+from .visibility import layers_at
 
 SIDE = 64  # pixels along the shortest side of the canvas that sums are watched on
 MOST_TURNS = 40  # changes between adding and subtracting

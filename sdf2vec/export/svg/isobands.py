@@ -13,8 +13,8 @@ import numpy as np
 from ...blend import REACH
 from ...scene import Layer
 from .canvas import Canvas, Points
-from .field import Array, Box, Grid, distances, extent, grid_over
-from .stops import SOFT
+from .gradient_stops import SOFT
+from .sampling import Array, Box, Grid, distances, extent, grid_over
 
 TRACE = 768  # grid cells along the canvas' shortest side
 SOFTLY = 12  # grid cells in a falloff are enough
@@ -69,7 +69,7 @@ def band_count(contrast: float, levels: float, width: float = math.inf) -> int:
 
 def _distance_at(cover: float) -> float:
     """Distance in falloffs at which coverage has a value."""
-    from .stops import edge_profile
+    from .gradient_stops import edge_profile
 
     x = np.linspace(0.5 - REACH, SOFT, 4001)
     return float(np.interp(-cover, -edge_profile(x), x))

@@ -8,9 +8,9 @@ from typing import NamedTuple
 import numpy as np
 
 from ...scene import Layer
-from .bands import seen
 from .canvas import Canvas, Document, color_text, mean_color, number, tag, url
-from .field import Array, colors, covers, grid_over
+from .isobands import seen
+from .sampling import Array, colors, covers, grid_over
 
 STOPS = 7
 CELLS = 48  # of the grid along the longest side

@@ -16,11 +16,11 @@ import numpy as np
 
 from ...scene import Layer
 from ...shapes import EllipseOutline, Outline, PolygonOutline
+from .bezier_fit import relative_polygon
 from .blur import GAUSSIAN, LEAST, Blurred, best_blur, nearest, trial_of
 from .canvas import Canvas, Document, Points, color_text, mean_color, number, tag, url
-from .curves import relative_polygon
-from .field import distances
 from .outlines import Traced, convex, core, distance_to, element, sharpened
+from .sampling import distances
 
 GROUP = {"fill": "currentColor", "stroke": "currentColor", "stroke_width": "0", "stroke_linejoin": "round"}
 TOLERANCE = 0.5  # user units that a traced contour may be off

@@ -17,8 +17,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...scene import Layer, Scene
-from .field import Array, Grid
-from .weigh import layers_at, showing, small_canvas, steps_over
+from .sampling import Array, Grid
+from .visibility import layers_at, showing, small_canvas, steps_over
 
 SIDE = 128  # pixels along the shortest side of the picture that is solved for
 MOST = 1 << 23  # layers × pixels

@@ -11,9 +11,9 @@ from dataclasses import replace
 import numpy as np
 
 from ...scene import Layer
-from .bands import contours, seen, trace_grid
 from .canvas import Canvas, Points
-from .field import Array, Grid, colors, covers
+from .isobands import contours, seen, trace_grid
+from .sampling import Array, Grid, colors, covers
 
 LEAST = 1e-6
 
