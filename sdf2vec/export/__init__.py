@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from ..errors import Sdf2vecError
 from ..scene import Scene, dumps
 from . import component, page, raster, shader, svg
+from .exported import Exported
 from .options import Options
 
 
@@ -45,6 +46,15 @@ def _shader(name: str, suffix: str, about: str) -> Exporter:
     return Exporter(suffix, write, about, notes, beside)
 
 
+def _once(suffix: str, made: Callable[[Scene, Options], Exported], about: str) -> Exporter:
+    return Exporter(
+        suffix,
+        lambda scene, options: made(scene, options).data,
+        about,
+        lambda scene, options: made(scene, options).notes,
+    )
+
+
 def _json(scene: Scene, options: Options) -> str:
     return dumps(scene)
 
@@ -55,9 +65,9 @@ EXPORTERS: dict[str, Exporter] = {
     "wgsl": _shader("wgsl", ".wgsl", "shader module for WebGPU"),
     "three": _shader("three", ".three.js", "three.js material, an ES module"),
     "godot": _shader("godot", ".gdshader", "canvas item shader for Godot 4"),
-    "svg": Exporter(".svg", svg.svg, "SVG that looks the same in every renderer", svg.notes),
-    "data-uri": Exporter(".uri.txt", svg.data_uri, "that SVG as a data URI", svg.notes),
-    "pdf": Exporter(".pdf", svg.pdf, "the portable SVG as PDF, by CairoSVG", svg.pdf_notes),
+    "svg": _once(".svg", svg.svg, "SVG that looks the same in every renderer"),
+    "data-uri": _once(".uri.txt", svg.data_uri, "that SVG as a data URI"),
+    "pdf": _once(".pdf", svg.pdf, "the portable SVG as PDF, by CairoSVG"),
     "html": Exporter(".html", page.html, "one page without dependencies: shader, drawing, copy buttons"),
     "component": Exporter(
         ".sdf-image.js", component.component, "<sdf-image>, an element that shows scene files"

@@ -8,8 +8,8 @@ from dataclasses import dataclass, field
 
 @dataclass(frozen=True)
 class Exported:
-    """An export: its text or bytes; files that belong beside it, by what takes the place of its suffix; what was chosen or given
-    up, a line each; `error`: how far it is off from the scene by construction, at most, in 8-bit levels."""
+    """An export: its text or bytes; files that belong beside it, by what takes the place of its suffix; what was chosen
+    or given up, a line each; `error`: how far it is off from the scene by construction, at most, in 8-bit levels."""
 
     data: str | bytes
     beside: Mapping[str, bytes] = field(default_factory=dict)

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
-from ..blend import FRAMINGS
+from ..blend import COMPOSITING, FRAMINGS
 from ..errors import Sdf2vecError
+from ..scene import Scene
 
 GLSL_VERSIONS = {"es300": "300 es", "330": "330", "es100": "100"}
 LAYOUTS = ("auto", "readable", "table", "tiled", "packed", "data")
@@ -44,6 +45,21 @@ class Options:
         _check("SVG profile", self.svg_profile, SVG_PROFILES)
         if self.svg_size_limit is not None and self.svg_size_limit < 1:
             raise Sdf2vecError(f"the SVG size limit must be at least 1 byte, got {self.svg_size_limit}")
+
+
+@dataclass(frozen=True)
+class Accepts:
+    """Which scenes an exporter takes: of these compositings, additive ones perhaps on an opaque ground only."""
+
+    compositing: tuple[str, ...] = field(default_factory=lambda: tuple(COMPOSITING))
+    additive_needs_ground: bool = False
+
+    def refusal(self, scene: Scene) -> str:
+        """Why a scene is not taken; empty where it is."""
+        if scene.compositing not in self.compositing:
+            return "without blend modes"
+        transparent = scene.compositing == "additive" and scene.background is None
+        return "on a transparent ground" if transparent and self.additive_needs_ground else ""
 
 
 def _check(what: str, value: str, known: tuple[str, ...]) -> None:

@@ -42,7 +42,7 @@ def html(scene: Scene, options: Options) -> str:
 def _drawing(scene: Scene, options: Options) -> str:
     """The SVG as part of a page, or nothing where no drawing can show the scene."""
     try:
-        drawing = svg(scene, options)
+        drawing = str(svg(scene, options).data)
     except Sdf2vecError:
         return ""
     return drawing[drawing.index("<svg") :].strip()

@@ -2,81 +2,66 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Sequence
 from itertools import pairwise
 
 import numpy as np
 
-from .canvas import Canvas, Points
+from ...deferred import deferred
+from .canvas import Canvas, Points, pairs
+from .display import Contour, Path, Segment
 
-ASIDE = (
-    0.0137  # user units: no corner is the middle of a pixel, where renderers differ about whose that pixel is
-)
+# User units: no corner is the middle of a pixel, where renderers differ about whose that pixel is.
+ASIDE = 0.0137
 ROUNDS = 3  # of fitting a curve and moving its parameters to the nearest places
 
-
-def path_data(contours: list[Points], tolerance: float, canvas: Canvas) -> str:
-    """Path data of closed contours [M, 2] in user units, at most about `tolerance` away from them."""
-    return "".join(_closed(contour, tolerance, canvas) for contour in contours)
+approximate_polygon: Callable[[Points, float], Points] = deferred("skimage.measure", "approximate_polygon")
 
 
-def polygon_data(contours: list[Points], tolerance: float, canvas: Canvas) -> str:
+def smooth_path(contours: Sequence[Points], tolerance: float, canvas: Canvas) -> Path:
+    """Closed contours [M, 2] in user units as curves, at most about `tolerance` away from them."""
+    return Path(tuple(_smooth(contour, tolerance, canvas) for contour in contours))
+
+
+def straight_path(contours: Sequence[Points], tolerance: float, canvas: Canvas) -> Path:
     """The same with straight lines: unlike curves', their pixels are the same in every path they are part of."""
-    from skimage.measure import approximate_polygon
-
-    return "".join(
-        relative_polygon(approximate_polygon(contour, tolerance)[:-1], canvas, ASIDE) for contour in contours
-    )
+    corners = [approximate_polygon(contour, tolerance)[:-1] for contour in contours]
+    return Path(tuple(_straight(canvas.rounded(points - ASIDE) + ASIDE) for points in corners))
 
 
-def relative_polygon(points: Points, canvas: Canvas, aside: float = 0.0) -> str:
-    """Path data of a closed polygon by how far each corner is from the last, all corners `aside` of round numbers."""
-    rounded = canvas.rounded(points - aside)
-    start = " ".join(canvas.fine(v) for v in (rounded[0] + aside).tolist())
-    rest = " ".join(canvas.number(v) for v in np.diff(rounded, axis=0).ravel().tolist())
-    return f"M{start}l{rest}z".replace(" -", "-")
+def _straight(corners: Points) -> Contour:
+    first, *rest = pairs(corners)
+    return Contour(first, tuple((corner,) for corner in rest))
 
 
-def _closed(contour: Points, tolerance: float, canvas: Canvas) -> str:
-    from skimage.measure import approximate_polygon
-
+def _smooth(contour: Points, tolerance: float, canvas: Canvas) -> Contour:
     points = contour[:-1] if np.array_equal(contour[0], contour[-1]) else contour
     points = np.concatenate([points, points[:1]])
     rough = approximate_polygon(points, 12 * tolerance)
     if len(rough) < 4:
-        return canvas.polygon_path(approximate_polygon(points, tolerance)[:-1])
-    places = _places(points, rough)
-    commands: list[tuple[str, Points]] = []
-    for start, end in pairwise(places):
-        commands += _spans(points, start, end, tolerance)
-    return f"M{canvas.joined(points[:1])}{_relative(points[0], commands, canvas)}Z"
+        return _straight(canvas.rounded(approximate_polygon(points, tolerance)[:-1]))
+    curves: list[Points] = []
+    for start, end in pairwise(_knots(points, rough)):
+        curves += _spans(points, start, end, tolerance)
+    segments: tuple[Segment, ...] = tuple(pairs(canvas.rounded(curve)) for curve in curves)
+    return Contour(segments[-1][-1], segments)
 
 
-def _relative(start: Points, commands: list[tuple[str, Points]], canvas: Canvas) -> str:
-    """Commands in coordinates relative to where each begins; rounding does not add up."""
-    here = canvas.rounded(start)
-    parts, last = [], ""
-    for command, points in commands:
-        written = canvas.rounded(points)
-        parts.append((command if command != last else " ") + canvas.joined(written - here))
-        here, last = written[-1], command
-    return "".join(parts)
-
-
-def _places(points: Points, knots: Points) -> list[int]:
+def _knots(points: Points, knots: Points) -> list[int]:
     """Indices of the knots, which are points of the contour in its order."""
     lookup = {tuple(p): i for i, p in reversed(list(enumerate(points.tolist())))}
     inner = [lookup[tuple(knot)] for knot in knots[1:-1].tolist()]
     return [0, *inner, len(points) - 1]
 
 
-def _spans(points: Points, start: int, end: int, tolerance: float) -> list[tuple[str, Points]]:
-    """Curve commands from one point of a contour to another; split where one curve does not follow it."""
+def _spans(points: Points, start: int, end: int, tolerance: float) -> list[Points]:
+    """Lines and curves from one point of a contour to another; split where one curve does not follow it."""
     span = points[start : end + 1]
     if end - start < 4:
-        return [("l", span[-1:])]
+        return [span[-1:]]
     handles, worst, where = _fit(span)
     if worst <= tolerance or end - start < 8:
-        return [("c", np.stack([*handles, span[-1]]))]
+        return [np.stack([*handles, span[-1]])]
     middle = start + min(max(where, 3), end - start - 3)
     return [*_spans(points, start, middle, tolerance), *_spans(points, middle, end, tolerance)]
 

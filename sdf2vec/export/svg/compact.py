@@ -1,36 +1,35 @@
-"""The smallest text that still blurs: one short element a shape, and classes for how soft and how round it is.
+"""The smallest drawing that still blurs: one element a shape, of whole coordinates and few softnesses.
 
-A polygon's round corners are a stroke in its own colour, as wide for all shapes of a class; colour is `currentColor`,
-so that it is said once. Coordinates are whole numbers, colours and opacities have few steps; the colours are solved
-for with all that is coarse about the drawing known.
+A polygon's round corners are as wide for all shapes of a softness; colours and opacities have few steps, which are
+solved for with all that is coarse about the drawing known.
 """
 
 from __future__ import annotations
 
 import math
 import warnings
-from collections.abc import Sequence
-from typing import NamedTuple
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any, NamedTuple
 
 import numpy as np
 
-from ...scene import Layer
+from ...deferred import deferred
+from ...scene import Layer, Scene
 from ...shapes import EllipseOutline, Outline, PolygonOutline
-from .bezier_fit import relative_polygon
-from .blur import GAUSSIAN, LEAST, Blurred, best_blur, nearest, trial_of
-from .canvas import Canvas, Document, Points, color_text, mean_color, number, tag, url
-from .outlines import Traced, convex, core, distance_to, element, sharpened
+from .blur import LEAST, Blurred, deviation_of_edge, nearest, trial_of
+from .canvas import Canvas, pairs
+from .display import Figure, Geometry, moved
+from .outlines import Traced, convex, core, distance_to, edge_of, placed, sharpened
 from .sampling import distances
 
-GROUP = {"fill": "currentColor", "stroke": "currentColor", "stroke_width": "0", "stroke_linejoin": "round"}
 TOLERANCE = 0.5  # user units that a traced contour may be off
+
+kmeans2: Callable[..., Any] = deferred("scipy.cluster.vq", "kmeans2")
 
 
 class Grain(NamedTuple):
-    """How coarse a small drawing is.
-
-    `units` along the shortest side, how many `softnesses`, steps of `colors` and `opacities`, `margins` of a filter
-    region around an element, in its box.
+    """How coarse a small drawing is: `units` along the shortest side, how many `softnesses`, steps of `colors` and
+    `opacities`, `margins` of a blurred element that filters are made for, in its box.
     """
 
     units: int
@@ -48,12 +47,29 @@ GRAINS = (
 )
 
 
+def compact_blurs(
+    scene: Scene, soft: Sequence[bool], traced: Mapping[int, Blurred], grain: Grain, canvas: Canvas
+) -> dict[int, Blurred]:
+    """Every layer that is seen as an outline, blurred by one of few deviations or, where that is nearer, not at all.
+
+    `traced`: the blurs of those layers that have no outline of their own.
+    """
+    falloffs = [layer.falloff if own else 0.0 for layer, own in zip(scene.layers, soft, strict=True)]
+    deviations = softnesses(falloffs, canvas, grain.softnesses)
+    found = {}
+    for index, (layer, deviation) in enumerate(zip(scene.layers, deviations, strict=True)):
+        outline = edge_of(layer, 0.5)
+        if outline is not None:
+            found[index] = _compact_blur(layer, outline, deviation, canvas)
+        elif index in traced:
+            found[index] = _coarsened(traced[index], deviation)
+    return found
+
+
 def softnesses(falloffs: Sequence[float], canvas: Canvas, count: int) -> list[float]:
     """For each falloff the standard deviation of its class, in scene units; 0 for none. k-means of their logarithms."""
-    from scipy.cluster.vq import kmeans2
-
     least = LEAST / canvas.pixels / canvas.unit
-    wanted = np.log([max(GAUSSIAN * falloff, least) for falloff in falloffs if falloff])
+    wanted = np.log([max(deviation_of_edge() * falloff, least) for falloff in falloffs if falloff])
     if not wanted.size:
         return [0.0] * len(falloffs)
     first = np.unique(np.quantile(wanted, (np.arange(count) + 0.5) / count))
@@ -64,16 +80,15 @@ def softnesses(falloffs: Sequence[float], canvas: Canvas, count: int) -> list[fl
     return [next(found) if falloff else 0.0 for falloff in falloffs]
 
 
-def lean_blur(layer: Layer, outline: Outline | None, deviation: float, canvas: Canvas) -> Blurred | None:
-    """A layer as an outline, blurred if that is nearer, with the numbers to write; None where nothing is seen."""
-    size = (canvas.width, canvas.height, canvas.unit)
-    if outline is None:
-        blurred = best_blur(layer, size)
-        if blurred is None or not isinstance(blurred.outline, Traced):
-            return None
-        kept = deviation if blurred.deviation else 0.0
-        return blurred._replace(outline=Traced(blurred.outline.contours, TOLERANCE), deviation=kept)
-    trial = trial_of(layer, size)
+def _coarsened(blurred: Blurred, deviation: float) -> Blurred:
+    assert isinstance(blurred.outline, Traced)
+    outline = Traced(blurred.outline.contours, TOLERANCE)
+    return blurred._replace(outline=outline, deviation=deviation if blurred.deviation else 0.0)
+
+
+def _compact_blur(layer: Layer, outline: Outline, deviation: float, canvas: Canvas) -> Blurred:
+    """An outline with the numbers to write, blurred if that is nearer."""
+    trial = trial_of(layer, canvas)
     if isinstance(outline, EllipseOutline):
         field = distances(layer, trial.grid) - 0.5 * layer.falloff
         return nearest([trial.judged(outline, field, tried) for tried in (0.0, deviation)])
@@ -86,73 +101,27 @@ def lean_blur(layer: Layer, outline: Outline | None, deviation: float, canvas: C
 def _polygon(outline: Outline, deviation: float, canvas: Canvas) -> PolygonOutline:
     """The nearest polygon with whole coordinates and rounding; of a triangle the rounding is that of its class."""
     points, own = core(outline) or (np.zeros((1, 2)), 0.0)
-    by_class = isinstance(outline, PolygonOutline)
-    rounding = _rounding(deviation, canvas) if by_class else round(own * canvas.unit) / canvas.unit
-    made = PolygonOutline(_pairs(points), own)
+    of_class = 0.5 * deviation / deviation_of_edge()  # half the falloff that a standard deviation stands for
+    wanted = of_class if isinstance(outline, PolygonOutline) else own
+    rounding = round(wanted * canvas.unit) / canvas.unit
+    made = PolygonOutline(pairs(points), own)
     if own > 0 and isinstance(sharp := sharpened(made, rounding / own), PolygonOutline):
         made = sharp
     whole = canvas.rounded(canvas.places(convex(np.array(made.points, np.float64))))
-    return PolygonOutline(_pairs(canvas.from_places(whole)), rounding)
+    return PolygonOutline(pairs(canvas.from_places(whole)), rounding)
 
 
-def _rounding(deviation: float, canvas: Canvas) -> float:
-    """Half the falloff that a standard deviation stands for, in whole units."""
-    return round(0.5 * deviation / GAUSSIAN * canvas.unit) / canvas.unit
+def figure(layer: Layer, blurred: Blurred, canvas: Canvas) -> Figure:
+    """A layer as one figure in its mean colour."""
+    color = moved(np.mean([shape.color for shape in layer.shapes], axis=0).tolist(), 0.0)
+    geometry = _whole(placed(blurred.outline, canvas))
+    return Figure(geometry, color, layer.opacity, blurred.deviation * canvas.unit)
 
 
-def _pairs(points: Points) -> tuple[tuple[float, float], ...]:
-    return tuple((x, y) for x, y in points.tolist())
-
-
-def lean(layer: Layer, blurred: Blurred, grain: Grain, document: Document) -> str:
-    """A layer as one element in a group with the attributes `GROUP`."""
-    opacity = number(layer.opacity, 2)
-    look = {
-        "class_": _class(blurred, grain, document) if blurred.deviation else None,
-        "color": color_text(mean_color([shape.color for shape in layer.shapes])),
-        "opacity": None if opacity == "1" else opacity,
-    }
-    outline, canvas = blurred.outline, document.canvas
-    if isinstance(outline, EllipseOutline):
-        return tag("ellipse", **look, **_ellipse(outline, canvas))
-    if not isinstance(outline, PolygonOutline):
-        return element(outline, canvas, **look)
-    if outline.rounding != _rounding(blurred.deviation, canvas):
-        look["stroke_width"] = canvas.number(2.0 * outline.rounding * canvas.unit)
-    points = canvas.places(outline.points)
-    texts = (relative_polygon(np.roll(points, -first, axis=0), canvas) for first in range(len(points)))
-    return tag("path", **look, d=min(texts, key=len))
-
-
-def _ellipse(outline: EllipseOutline, canvas: Canvas) -> dict[str, str]:
-    """The attributes of an ellipse in whole units and degrees."""
-    x, y = (number(v, 0) for v in canvas.places(outline.center)[0].tolist())
-    rx, ry = (number(max(radius * canvas.unit, 1.0), 0) for radius in outline.radii)
-    turned = number(math.degrees(outline.angle) % 180.0, 0)
-    return {"rx": rx, "ry": ry, "transform": f"translate({x} {y})rotate({turned})"}
-
-
-def _class(blurred: Blurred, grain: Grain, document: Document) -> str:
-    """The class for a softness, with a filter whose region is large enough for an element of this box."""
-    canvas, outline = document.canvas, blurred.outline
-    deviation = blurred.deviation * canvas.unit
-    own = outline.rounding if isinstance(outline, PolygonOutline) else 0.0
-    needed = (3.0 * deviation + own * canvas.unit) / max(float(_box(outline).min()) * canvas.unit, 0.1)
-    share = next((step for step in grain.margins if step >= needed), grain.margins[-1])
-    near, whole = number(-share, 1), number(1.0 + 2.0 * share, 1)
-    region = {"x": near, "y": near, "width": whole, "height": whole}
-    blur = tag("feGaussianBlur", stdDeviation=f"{deviation:.3g}")
-    filter_ = document.define("", "filter", blur, **region, color_interpolation_filters="sRGB")
-    by_class = own and own == _rounding(blurred.deviation, canvas)
-    width = f";stroke-width:{canvas.number(2.0 * own * canvas.unit)}" if by_class else ""
-    return document.style(f"filter:{url(filter_)}{width}")
-
-
-def _box(outline: Outline | Traced) -> Points:
-    """Width and height [2] of an outline without its rounding, in scene units."""
-    if isinstance(outline, Traced | PolygonOutline):
-        points = np.concatenate(outline.contours) if isinstance(outline, Traced) else np.array(outline.points)
-        return np.asarray(np.ptp(points, axis=0))
-    cosine, sine = abs(math.cos(outline.angle)), abs(math.sin(outline.angle))
-    a, b = outline.radii if isinstance(outline, EllipseOutline) else outline.half_size
-    return 2.0 * np.array([a * cosine + b * sine, a * sine + b * cosine])
+def _whole(geometry: Geometry) -> Geometry:
+    """The same; of an ellipse, radii of one unit or more and whole degrees."""
+    if not isinstance(geometry, EllipseOutline):
+        return geometry
+    radii = (max(geometry.radii[0], 1.0), max(geometry.radii[1], 1.0))
+    angle = math.radians(round(math.degrees(geometry.angle)))
+    return EllipseOutline(geometry.center, radii, angle)

@@ -9,15 +9,16 @@ to what it was and within its range.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
+from ...deferred import deferred
 from ...scene import Layer, Scene
-from .sampling import Array, Grid
+from .sampling import Array, SampleGrid
 from .visibility import layers_at, showing, small_canvas, steps_over
 
 SIDE = 128  # pixels along the shortest side of the picture that is solved for
@@ -34,11 +35,13 @@ ROUNDING = (
 
 Single = NDArray[np.float32]
 
+map_coordinates: Callable[..., Array] = deferred("scipy.ndimage", "map_coordinates")
+
 
 class Difference(NamedTuple):
     """Drawn coverage minus the layer's own, [Y, X] on a grid."""
 
-    grid: Grid
+    grid: SampleGrid
     off: Array | Single
 
     def coarse(self) -> Difference:
@@ -52,10 +55,10 @@ class Difference(NamedTuple):
             axis[0] + (np.arange(count) * block + middle) * step
             for axis, count in ((self.grid.x, columns), (self.grid.y, rows))
         )
-        return Difference(Grid(x, y, step * block), means)
+        return Difference(SampleGrid(x, y, step * block), means)
 
 
-def compensated(
+def refitted(
     scene: Scene,
     drawn: Mapping[int, Difference],
     cut: Sequence[int] = (),
@@ -208,8 +211,6 @@ def _stack(scene: Scene, drawn: Mapping[int, Difference], cut: Sequence[int]) ->
 
 def _add(difference: Difference, x: Array, y: Array, cover: Single) -> None:
     """Adds a difference to coverage [Y, X] at the places x and y, interpolated."""
-    from scipy.ndimage import map_coordinates
-
     grid, off = difference
     across, down = (x - grid.x[0]) / grid.step, (y - grid.y[0]) / grid.step
     columns = np.flatnonzero((across > -0.5) & (across < len(grid.x) - 0.5))

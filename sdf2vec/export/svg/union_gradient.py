@@ -1,14 +1,14 @@
-"""The colour of a smooth union of shapes with different colours, as a linear gradient."""
+"""The fill of a layer: a colour, or the colours of a smooth union as a linear gradient."""
 
 from __future__ import annotations
 
-from functools import lru_cache
 from typing import NamedTuple
 
 import numpy as np
 
-from ...scene import Layer
-from .canvas import Canvas, Document, color_text, mean_color, number, tag, url
+from ...scene import Color, Layer
+from .canvas import Canvas, pairs
+from .display import LinearGradient, Stop, moved
 from .isobands import seen
 from .sampling import Array, colors, covers, grid_over
 
@@ -17,50 +17,41 @@ CELLS = 48  # of the grid along the longest side
 SAME = 0.5 / 255.0
 
 
-class Shade(NamedTuple):
-    """A gradient: the places of its stops [S, 2] in scene units, their colours [S, 3], and how far it is off."""
+class LayerFill(NamedTuple):
+    """A fill, and by how many 8-bit levels the layer's own colours differ from it."""
 
-    places: Array
-    colors: Array
-    error: float
-
-
-def fill_of(layer: Layer, document: Document, lift: float = 0.0) -> str:
-    """A colour, or a gradient along the direction in which the union's colour changes most; `lift` in 8-bit levels."""
-    shade = shade_of(layer, document.canvas)
-    if shade is None:
-        return color_text(mean_color([shape.color for shape in layer.shapes]), lift)
-    return url(_gradient(shade, document))
+    fill: Color | LinearGradient
+    error: float = 0.0
 
 
-def is_mixed(layer: Layer, canvas: Canvas, levels: float) -> bool:
-    """Whether a layer has colours that no gradient shows with an error below so many 8-bit levels."""
-    shade = shade_of(layer, canvas) if len(layer.shapes) > 1 else None
-    return shade is not None and 255.0 * shade.error * layer_weight(layer) > levels
+def fill_of(layer: Layer, canvas: Canvas, lift: float = 0.0) -> LayerFill:
+    """The mean colour, or for several a gradient along the direction in which they change most.
 
-
-@lru_cache(maxsize=1024)
-def shade_of(layer: Layer, canvas: Canvas) -> Shade | None:
-    """The gradient nearest to a union's colours; None where there is but one, or nothing to see."""
+    `lift`: 8-bit levels that colours are raised by.
+    """
     own = np.array([shape.color for shape in layer.shapes])
+    flat = LayerFill(moved(own.mean(axis=0).tolist(), lift))
+    if np.ptp(own, axis=0).max() <= SAME:
+        return flat
     box = seen(layer, canvas)
-    if np.ptp(own, axis=0).max() <= SAME or box.empty:
-        return None
-    grid = grid_over(box, max(box.right - box.left, box.bottom - box.top) / CELLS)
-    weight = covers(layer, grid, 1.0 / canvas.unit).ravel() * layer_weight(layer)
+    if box.empty:
+        return flat
+    grid = grid_over(box, box.longest / CELLS)
+    weight = covers(layer, grid, 1.0 / canvas.unit).ravel() * max(layer.opacity, 1e-3)
     if weight.max() < 1e-3:
-        return None
+        return flat
     places = np.stack([v.ravel() for v in np.meshgrid(grid.x, grid.y)], axis=1)
-    return _nearest(places, colors(layer, grid).reshape(3, -1).T, weight)
+    knots, values, off = nearest_gradient(places, colors(layer, grid).reshape(3, -1).T, weight)
+    start, end = pairs(canvas.places(knots[[0, -1]]))
+    stops = tuple(Stop(i / (STOPS - 1), moved(value, lift)) for i, value in enumerate(values.tolist()))
+    return LayerFill(LinearGradient(start, end, stops), 255.0 * off * max(layer.opacity, 1e-3))
 
 
-def layer_weight(layer: Layer) -> float:
-    """Opacity, never quite 0."""
-    return max(abs(layer.opacity), 1e-3)
+def nearest_gradient(places: Array, wanted: Array, weight: Array) -> tuple[Array, Array, float]:
+    """Places [S, 2] and colours [S, 3] of the stops nearest to colours [P, 3] at places [P, 2], and their error.
 
-
-def _nearest(places: Array, wanted: Array, weight: Array) -> Shade:
-    """Least squares for the direction first, then for the stops."""
+    Least squares, weighted by [P], for the direction first, then for the stops.
+    """
     root = np.sqrt(weight)[:, None]
     middle = np.average(places, axis=0, weights=weight)
     flat = np.concatenate([places - middle, np.ones((len(places), 1))], axis=1)
@@ -71,22 +62,8 @@ def _nearest(places: Array, wanted: Array, weight: Array) -> Shade:
     knots = np.linspace(kept.min(), kept.max(), STOPS)
     hats = np.stack([np.interp(along, knots, row) for row in np.eye(STOPS)], axis=1)
     ridge = 1e-3 * np.sqrt(weight.sum()) * np.eye(STOPS)
-    stacked = np.concatenate([hats * root, ridge])
     mean = np.average(wanted, axis=0, weights=weight)
-    values, *_ = np.linalg.lstsq(
-        stacked, np.concatenate([wanted * root, ridge @ np.tile(mean, (STOPS, 1))]), rcond=None
-    )
+    right = np.concatenate([wanted * root, ridge @ np.tile(mean, (STOPS, 1))])
+    values, *_ = np.linalg.lstsq(np.concatenate([hats * root, ridge]), right, rcond=None)
     off = np.average(np.square(hats @ values - wanted).mean(axis=1), weights=weight)
-    return Shade(middle + np.outer(knots, direction), values, float(np.sqrt(off)))
-
-
-def _gradient(shade: Shade, document: Document) -> str:
-    """The gradient's id."""
-    canvas = document.canvas
-    stops = [
-        tag("stop", offset=number(i / (STOPS - 1), 3), stop_color=color_text(value))
-        for i, value in enumerate(shade.colors.tolist())
-    ]
-    (x1, y1), (x2, y2) = canvas.places(shade.places[[0, -1]]).tolist()
-    ends = {name: canvas.number(v) for name, v in (("x1", x1), ("y1", y1), ("x2", x2), ("y2", y2))}
-    return document.define("shade", "linearGradient", *stops, gradientUnits="userSpaceOnUse", **ends)
+    return middle + np.outer(knots, direction), values, float(np.sqrt(off))

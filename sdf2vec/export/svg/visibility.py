@@ -8,8 +8,13 @@ from typing import TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
+from ...deferred import deferred
 from ...scene import Scene
 from .sampling import Array
+
+pixel_points = deferred("sdf2vec.render.reference", "canvas")
+covers_at = deferred("sdf2vec.render.reference", "layers_at")
+from_scene = deferred("sdf2vec.render.tensors", "from_scene")
 
 Float = TypeVar("Float", np.float32, np.float64)
 
@@ -21,14 +26,12 @@ AT_ONCE = 1 << 20  # of them, for a formula holds dozens of numbers for each
 def contrasts(scene: Scene) -> Array:
     """[N]: the mean squared change of the picture, per channel, that an error 1 of each layer's coverage makes.
 
-    Under `over` it counts what lies below the layer and how much of it later layers hide; the mean is over the
-    layer's soft edge.
+    It counts what lies below the layer and how much of it later layers hide; the mean is over the layer's soft edge.
     """
+    if not scene.layers:
+        return np.zeros(0)
     covers, colors = layers_at(scene, SIDE)
     soft = covers * (1.0 - covers) + 1e-3 * covers + 1e-9
-    if scene.compositing == "additive":
-        change = np.square(colors).mean(axis=1)
-        return np.asarray(np.sum(soft * change, axis=1) / soft.sum(axis=1))
     opacity = np.array([layer.opacity for layer in scene.layers])[:, None]
     alphas = covers * opacity
     through = showing(alphas) * opacity
@@ -64,16 +67,13 @@ def steps_over(alphas: NDArray[Float], colors: Array, ground: Array | None) -> I
 
 def layers_at(scene: Scene, side: int, most: int = MOST) -> tuple[Array, Array]:
     """Coverage [N, P] and colour [N, 3, P or 1] of all layers on a small canvas of the scene's shape."""
-    from ...render import reference
-    from ...render.tensors import from_scene
-
     width, height = small_canvas(scene, side, most)
     tensors = from_scene(scene)
-    x, y, pixel = reference.canvas(tensors, width, height)
+    x, y, pixel = pixel_points(tensors, width, height)
     scale = min(width, height) / min(scene.width, scene.height)
     chunk = max(1, AT_ONCE // len(scene.layers))
     chunks = zip(x.split(chunk), y.split(chunk), strict=True)
-    parts = [reference.layers_at(tensors, own_x, own_y, pixel * scale) for own_x, own_y in chunks]
+    parts = [covers_at(tensors, own_x, own_y, pixel * scale) for own_x, own_y in chunks]
     covers = np.concatenate([cover.numpy() for cover, _ in parts], axis=1, dtype=np.float64)
     colors = [color.double().numpy() for _, color in parts]
     return covers, colors[0] if colors[0].shape[2] == 1 else np.concatenate(colors, axis=2)
