@@ -80,11 +80,7 @@ class _Writer:
         )
         self.ids: dict[str, str] = {}
         self.classes: dict[str, str] = {}
-        self.roundings = Counter(
-            (item.blur, item.geometry.rounding)
-            for item in drawing.items
-            if isinstance(item, Figure) and isinstance(item.geometry, PolygonOutline)
-        )
+        self.roundings = _usual_roundings(drawing.items)
 
     def text(self) -> str:
         """The document without its title, ids with PREFIX."""
@@ -128,12 +124,13 @@ class _Writer:
             return self._painted(figure)
         assert isinstance(figure.fill, tuple)
         look: Attributes = {"color": color_text(figure.fill), "opacity": opacity_text(figure.opacity)}
-        stroke = self._stroke(figure)
+        rounding = _rounding(figure)
+        stroke = self.number(2.0 * rounding) if rounding else None
         if figure.blur:
-            often = self.roundings[figure.blur, getattr(figure.geometry, "rounding", 0.0)] > 1
-            rule = f";stroke-width:{stroke}" if stroke and often else ""
+            usual = stroke and rounding == self.roundings.get(figure.blur)
+            rule = f";stroke-width:{stroke}" if usual else ""
             look["class"] = self._class(f"filter:{self._filter(figure)}{rule}")
-            stroke = None if often else stroke
+            stroke = None if usual else stroke
         return look | {"stroke-width": stroke}
 
     def _painted(self, figure: Figure) -> Attributes:
@@ -146,10 +143,6 @@ class _Writer:
         if not figure.antialiased:
             look["shape-rendering"] = "crispEdges"
         return look
-
-    def _stroke(self, figure: Figure) -> str | None:
-        rounding = figure.geometry.rounding if isinstance(figure.geometry, PolygonOutline) else 0.0
-        return self.number(2.0 * rounding) if rounding else None
 
     @singledispatchmethod
     def paint(self, fill: Color, figure: Figure) -> str:
@@ -200,11 +193,9 @@ class _Writer:
 
     def _margins(self, figure: Figure) -> tuple[float, float]:
         """How far a blur reaches beyond an element's box, in its sides."""
-        rounding = getattr(figure.geometry, "rounding", 0.0)
-        stroked = rounding if self.style.compact else 0.0
-        grown = 0.0 if self.style.compact else rounding
-        box = box_of(figure.geometry) + 2.0 * grown
-        wanted = (REACH * figure.blur + stroked) / np.maximum(box, 0.1)
+        rounding = _rounding(figure)
+        grown, stroked = (0.0, rounding) if self.style.compact else (rounding, 0.0)
+        wanted = (REACH * figure.blur + stroked) / np.maximum(box_of(figure.geometry) + 2.0 * grown, 0.1)
         across, down = (self._margin(share) for share in wanted.tolist())
         return (max(across, down),) * 2 if self.style.compact else (across, down)
 
@@ -267,8 +258,7 @@ class _Writer:
     @element.register
     def _(self, geometry: Path, look: Attributes) -> Element:
         data = "".join(map(self._relative, geometry.contours))
-        rule = "evenodd" if len(geometry.contours) > 1 else None
-        return self._with(self.svg.path(data), look | {"fill-rule": rule})
+        return self._with(self.svg.path(data), look | {"fill-rule": "evenodd"})
 
     def _with(self, element: Element, look: Mapping[str, str | None]) -> Element:
         element.attribs.update({key: value for key, value in look.items() if value is not None})
@@ -311,6 +301,17 @@ class _Writer:
     def fine(self, value: float) -> str:
         """A number that directions hang on: with two decimals more."""
         return number(value, self.drawing.digits + 2)
+
+
+def _rounding(figure: Figure) -> float:
+    return figure.geometry.rounding if isinstance(figure.geometry, PolygonOutline) else 0.0
+
+
+def _usual_roundings(items: Sequence[Item]) -> dict[float, float]:
+    """For each blur the rounding that most of its figures have."""
+    figures = [item for item in items if isinstance(item, Figure)]
+    counted = Counter((figure.blur, _rounding(figure)) for figure in figures if _rounding(figure))
+    return {blur: rounding for (blur, rounding), _ in reversed(counted.most_common())}
 
 
 def _polygon(corners: Points) -> Contour:
