@@ -16,7 +16,7 @@ from .gradient_stops import stop_count
 from .isobands import band_count
 from .outlines import edge_of
 from .sampling import Array
-from .visibility import contrasts
+from .visibility import LayerSamples, contrasts, layers_at
 
 SHARP = 2.0  # pixels: an edge softer than this is drawn soft
 SMALL = 64.0  # pixels along the shortest side: a picture smaller than this will be shown larger
@@ -67,6 +67,7 @@ class Plan:
     stops: list[int]
     bands: list[int]
     rings: bool
+    samples: LayerSamples
 
     def is_rounded_down(self, index: int, layer: Layer) -> bool:
         """Whether a layer is drawn by what 8 bits take from most: a blur, or bands."""
@@ -88,8 +89,12 @@ class Planner:
         self.soft = [layer.falloff * side > softest for layer in self.scene.layers]
 
     @cached_property
+    def samples(self) -> LayerSamples:
+        return layers_at(self.scene)
+
+    @cached_property
     def weights(self) -> Array:
-        return contrasts(self.scene)
+        return contrasts(self.scene, self.samples)
 
     @cached_property
     def blurs(self) -> dict[int, Blurred]:
@@ -127,7 +132,7 @@ class Planner:
         else:
             canvas = Canvas.of(scene, detail.coarser)
             blurred = self._near_enough(detail.target) if self.filters else {}
-        return Plan(canvas, self.soft, blurred, stops, bands, self.filters)
+        return Plan(canvas, self.soft, blurred, stops, bands, self.filters, self.samples)
 
     def _near_enough(self, target: float) -> dict[int, Blurred]:
         """The blurs of soft layers but the worst, which are given up until the target in dB is reached."""
