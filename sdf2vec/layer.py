@@ -209,24 +209,28 @@ class Formula:
 
         They hold for every distance that is off by at most `slack`. Scalars.
         """
-        outer, inner = self._reach()
-        parts = [self._parameters(index) for index in range(len(self.structure))]
+        outer, inner = self.reach
+        slope = self._kind(0).slope(*self._parameters(0))
+        for index in range(1, len(self.structure)):
+            slope = maximum(slope, self._kind(index).slope(*self._parameters(index)))
+        scalars = (outer + slack, inner - slack, slope)
+        return (*self.extent(outer + slack), *(scalar for expr in scalars for scalar in scalarize(expr)))
+
+    def extent(self, margin: Expr) -> list[Expr]:
+        """A box (low x, low y, high x, high y) that holds every point with distance ≤ margin, for margin ≥ 0."""
         smoothest = const(0.0)
         for index in self._adding[1:]:
             smoothest = maximum(smoothest, self.row.of(index, JOIN.name))
-        margin = outer + slack + union_reach(len(self._adding), smoothest)
-        box = list(scalarize(self._kind(0).extent(margin, *parts[0])))
-        slope = self._kind(0).slope(*parts[0])
-        for index in range(1, len(parts)):
-            slope = maximum(slope, self._kind(index).slope(*parts[index]))
-            if index in self._adding:
-                other = scalarize(self._kind(index).extent(margin, *parts[index]))
-                picks = (minimum, minimum, maximum, maximum)
-                box = [pick(a, b) for pick, a, b in zip(picks, box, other, strict=True)]
-        scalars = (outer + slack, inner - slack, slope)
-        return (*box, *(scalar for expr in scalars for scalar in scalarize(expr)))
+        farther = margin + union_reach(len(self._adding), smoothest)
+        boxes = [scalarize(self._kind(i).extent(farther, *self._parameters(i))) for i in self._adding]
+        box = list(boxes[0])
+        for other in boxes[1:]:
+            picks = (minimum, minimum, maximum, maximum)
+            box = [pick(a, b) for pick, a, b in zip(picks, box, other, strict=True)]
+        return box
 
-    def _reach(self) -> tuple[Expr, Expr]:
+    @property
+    def reach(self) -> tuple[Expr, Expr]:
         """The distances from which coverage is 0, and up to which it is 1."""
         patch, falloff = self._kind(0).patch, self.row.of(None, "falloff")
         if patch is not None:

@@ -8,22 +8,31 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import NamedTuple
 
 from .expr import VEC2, VEC3, Expr, clamp, dot, function, mix
 from .units import COLOR, DIRECTION, Parameter
 
 
+class Ramp(NamedTuple):
+    """A linear gradient: how it rises from 0 to 1 along the axes of a shape's frame, its colours at 0 and at 1."""
+
+    slope: tuple[float, float]
+    first: tuple[float, float, float]
+    last: tuple[float, float, float]
+
+
 @dataclass(frozen=True)
 class Paint:
     """`color(q, color, *own)` is the colour (vec3) at a point q of the shape's frame, in which the shape reaches from
-    about −1 to 1 along both axes. `own` are the parameters after `color`. `ramp` is for vector formats: from the values
-    of its own parameters the points of the frame where a linear gradient has its first and its last colour.
+    about −1 to 1 along both axes. `own` are the parameters after `color`. `ramp(color, *own)` is for vector formats: of a
+    linear gradient whose middle is the frame's its slope along the frame's axes, its first and its last colour.
     """
 
     name: str
     color: Callable[..., Expr]
     own: tuple[Parameter, ...] = ()
-    ramp: Callable[..., tuple[tuple[float, float], tuple[float, float]]] | None = None
+    ramp: Callable[..., Ramp] | None = None
 
     @property
     def parameters(self) -> tuple[Parameter, ...]:
@@ -45,14 +54,6 @@ def linear_paint(q: Expr, color: Expr, color_end: Expr, direction: Expr) -> Expr
     return mix(color, color_end, clamp(0.5 + dot(q, direction), 0.0, 1.0))
 
 
-def _linear_ramp(
-    color_end: tuple[float, float, float], direction: tuple[float, float]
-) -> tuple[tuple[float, float], tuple[float, float]]:
-    x, y = direction
-    half = 0.5 / max(x * x + y * y, 1e-12)
-    return (-x * half, -y * half), (x * half, y * half)
-
-
 PAINTS: dict[str, Paint] = {
     paint.name: paint
     for paint in (
@@ -61,7 +62,7 @@ PAINTS: dict[str, Paint] = {
             "linear",
             linear_paint,
             (Parameter("color_end", COLOR, (0.0, 0.0, 0.0)), Parameter("direction", DIRECTION, (0.5, 0.0))),
-            ramp=_linear_ramp,
+            ramp=lambda color, color_end, direction: Ramp(direction, color, color_end),
         ),
     )
 }

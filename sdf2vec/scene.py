@@ -226,6 +226,21 @@ class Layer:
         )
 
     @property
+    def seen(self) -> tuple[Shape, ...]:
+        """The shapes whose colours are seen: all but those that only take away."""
+        return tuple(s for s, part in zip(self.shapes, self.structure, strict=True) if part.adds)
+
+    @property
+    def colors(self) -> tuple[Color, ...]:
+        """All colours that its shapes are painted with."""
+        return tuple(color for shape in self.seen for color in shape.colors)
+
+    @property
+    def is_patch(self) -> bool:
+        """Whether it has coverage of its own instead of a soft edge."""
+        return KINDS[self.shapes[0].kind].patch is not None
+
+    @property
     def numbers(self) -> list[float]:
         """Its row: see `layer.slots`."""
         row = [self.opacity, self.falloff]

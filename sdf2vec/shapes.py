@@ -98,12 +98,14 @@ class Frame:
 @dataclass(frozen=True)
 class Patch:
     """Coverage of its own instead of a soft edge: `cover(p, pixel, *parameters)`, 0 from the distance
-    `reach(pixel, *parameters)` on, within −1..1 where `signed`.
+    `reach(pixel, *parameters)` on, within −1..1 where `signed`. `radial`: it only falls with the distance from the
+    middle of the shape's frame, measured in halves of its size.
     """
 
     cover: Callable[..., Expr]
     reach: Callable[..., Expr]
     signed: bool = False
+    radial: bool = False
 
 
 def _upright_frame(extent: Callable[..., Expr], *parameters: Expr) -> Frame:
@@ -500,7 +502,7 @@ KINDS: dict[str, Kind] = {
             _patch_thickness,
             exact=False,
             own_frame=_turned_frame,
-            patch=Patch(_gaussian_cover, _patch_reach),
+            patch=Patch(_gaussian_cover, _patch_reach, radial=True),
         ),
         Kind(
             "gabor",

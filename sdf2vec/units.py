@@ -112,6 +112,11 @@ class Parameter:
         """The float variables behind `variable`."""
         return components_of(self.variable(suffix))
 
+    def constant(self, values: Sequence[float]) -> Expr:
+        """Its value as a constant expression."""
+        exprs = [const(value) for value in values]
+        return exprs[0] if self.width == 1 else operation(self.type.value, *exprs)
+
     def values_from(self, numbers: Sequence[float]) -> float | tuple[float, ...]:
         """Its value as users have it: a float, or a tuple of several."""
         return tuple(numbers) if self.width > 1 else numbers[0]

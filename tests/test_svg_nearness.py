@@ -18,9 +18,9 @@ from sdf2vec.export.svg import smallest
 from sdf2vec.export.svg import svg as write_svg
 from sdf2vec.export.svg.blur import STEPS, trial_of
 from sdf2vec.export.svg.canvas import Canvas
-from sdf2vec.export.svg.compensate import Difference, compensated
-from sdf2vec.export.svg.field import Grid, covers, distances, extent, grid_over
 from sdf2vec.export.svg.outlines import element
+from sdf2vec.export.svg.refit_appearance import Difference, compensated
+from sdf2vec.export.svg.sampling import Grid, covers, distances, extent, grid_over
 from sdf2vec.image import premultiply
 from sdf2vec.render.reference import render
 from sdf2vec.shapes import PolygonOutline

@@ -3,14 +3,9 @@
 from __future__ import annotations
 
 import base64
-import math
 import re
+from collections.abc import Callable
 from dataclasses import replace
-from functools import lru_cache
-from typing import NamedTuple
-
-import numpy as np
-from msgspec import structs
 
 from ...deferred import deferred
 from ...errors import Sdf2vecError
@@ -18,54 +13,51 @@ from ...files import one_line
 from ...scene import Scene
 from ..exported import Exported
 from ..options import Accepts, Options
-from .canvas import Canvas, Document, color_text, tag
-from .compensate import compensated
-from .field import extent
-from .layers import Detail, Painter, Part, is_banded, is_soft, plan
-from .lean import GRAINS, GROUP
-from .sums import Term, alternating, terms
-
-_svg2pdf = deferred("cairosvg", "svg2pdf")
+from .layers import drawing
+from .plan import DETAILS, Detail, Planner
+from .writer import MARGINS, Style, written
 
 PORTABLE = "portable"
+ACCEPTED = ("over",)
 CREATED = re.compile(rb"(/CreationDate \(D:)([^)]*)")
-DIFFERENCE = "mix-blend-mode:difference"
 
-# From what looks like the render to what is small. Names go last, for they are what a person edits by.
-DETAILS = (
-    Detail(),
-    Detail(target=43.0, levels=0.3),
-    Detail(target=40.0, levels=0.5),
-    Detail(target=37.0, levels=0.8, coarser=1),
-    Detail(target=34.0, levels=1.2, coarser=1),
-    Detail(target=30.0, levels=2.0, coarser=1, named=False),
-    Detail(target=0.0, levels=4.0, coarser=1, named=False),
-    *(Detail(target=0.0, levels=4.0, named=False, lean=grain) for grain in GRAINS),
-)
-
-
-class Written(NamedTuple):
-    """A drawing without its title, and what a user should know about it."""
-
-    document: Document
-    notes: tuple[str, ...]
+svg2pdf: Callable[..., bytes] = deferred("cairosvg", "svg2pdf")
 
 
 def accepts(options: Options) -> Accepts:
-    """Sums need blend modes, and a ground to be added to."""
-    return Accepts(("over",) if options.svg_profile == PORTABLE else ("over", "additive"), True)
+    """An SVG can lay things on each other; light on light it can't add up without leaving the range of colours."""
+    return Accepts(ACCEPTED)
 
 
 def svg(scene: Scene, options: Options) -> Exported:
-    """The scene as SVG text in pixels of the fitted picture.
+    """The scene as SVG text in pixels of the fitted picture: the finest drawing that keeps to the size limit.
 
-    Raises Sdf2vecError for a scene that is not accepted, and for a size limit that can't be met.
+    Raises Sdf2vecError for a limit that can't be met, and for a scene that is not accepted.
     """
-    refusal = accepts(options).refusal(scene)
-    if refusal:
-        raise Sdf2vecError(f"svg: nothing can be added up {refusal}")
-    written = _written(scene, options)
-    return Exported(written.document.text(one_line(options.title)), notes=written.notes)
+    return _exported(scene, options, options.svg_profile)
+
+
+def _exported(scene: Scene, options: Options, profile: str) -> Exported:
+    limit = options.svg_size_limit
+    planner = _planner(scene, profile)
+    if limit is None:
+        return Exported(_text(planner, DETAILS[0], options))
+    size = 0
+    for detail in planner.details:
+        text = _text(planner, detail, options)
+        size = len(text.encode())
+        if size <= limit:
+            return Exported(text, notes=() if detail is DETAILS[0] else (_coarser(detail, limit),))
+    sharp = ", or sharp ones (--max-falloff 0)" if any(planner.soft) else ""
+    raise Sdf2vecError(
+        f"svg: {size:,} bytes at least, more than the limit of {limit:,}; fit fewer shapes{sharp}"
+    )
+
+
+def smallest(scene: Scene, options: Options) -> str:
+    """The smallest drawing of a scene there is."""
+    planner = _planner(scene, options.svg_profile)
+    return _text(planner, planner.details[-1], options)
 
 
 def data_uri(scene: Scene, options: Options) -> Exported:
@@ -76,103 +68,32 @@ def data_uri(scene: Scene, options: Options) -> Exported:
 
 def pdf(scene: Scene, options: Options) -> Exported:
     """The portable SVG as PDF, by CairoSVG. Raises Sdf2vecError where cairo is not installed."""
-    made = svg(scene, structs.replace(options, svg_profile=PORTABLE))
+    made = _exported(scene, options, PORTABLE)
     try:
-        drawn = bytes(_svg2pdf(bytestring=made.raw))
+        found = svg2pdf(bytestring=made.raw)
     except OSError:  # the package is there, the system's library is not
         raise Sdf2vecError("pdf: needs cairo: apt-get install libcairo2") from None
-    same = CREATED.sub(lambda found: found[1] + b"0" * len(found[2]), drawn)  # the same scene, the same file
-    return replace(made, data=same)
+    undated = CREATED.sub(
+        lambda found: found[1] + b"0" * len(found[2]), found
+    )  # the same scene, the same file
+    return replace(made, data=undated)
 
 
-def _written(scene: Scene, options: Options) -> Written:
-    """The finest drawing that keeps to the size limit."""
-    title, limit = one_line(options.title), options.svg_size_limit
-    if limit is None:
-        return _drawing(scene, options.svg_profile, DETAILS[0])
-    size = 0
-    for detail in _details(scene, options):
-        written = _drawing(scene, options.svg_profile, detail)
-        size = len(written.document.text(title).encode())
-        if size <= limit:
-            coarser = () if detail is DETAILS[0] else (_coarser(detail, limit),)
-            return Written(written.document, written.notes + coarser)
-    sharp = "" if _is_sharp(scene) else ", or sharp ones (--max-falloff 0)"
-    raise Sdf2vecError(
-        f"svg: {size:,} bytes at least, more than the limit of {limit:,}; fit fewer shapes{sharp}"
-    )
+def _planner(scene: Scene, profile: str) -> Planner:
+    if scene.compositing not in ACCEPTED:
+        raise Sdf2vecError(f"svg: takes scenes under {' or '.join(ACCEPTED)}, not {scene.compositing}")
+    return Planner(scene, profile != PORTABLE)
 
 
-def smallest(scene: Scene, options: Options) -> str:
-    """The smallest drawing of a scene there is."""
-    drawn = _drawing(scene, options.svg_profile, _details(scene, options)[-1])
-    return drawn.document.text(one_line(options.title))
-
-
-def _details(scene: Scene, options: Options) -> list[Detail]:
-    """The details that a drawing may have, finest first."""
-    lean = scene.compositing == "over" and (options.svg_profile != PORTABLE or _is_sharp(scene))
-    return [detail for detail in DETAILS if lean or not detail.lean]
-
-
-def _is_sharp(scene: Scene) -> bool:
-    """Whether no layer needs anything but plain elements."""
-    canvas = Canvas.of(scene)
-    return not any(is_soft(layer, canvas) for layer in scene.layers)
+def _text(planner: Planner, detail: Detail, options: Options) -> str:
+    grain = detail.grain
+    style = Style(detail.named, grain is not None, grain.margins if grain else MARGINS)
+    drawn = drawing(planner.scene, planner.plan(detail), detail)
+    return written(drawn, one_line(options.title), style)
 
 
 def _coarser(detail: Detail, limit: int) -> str:
-    if detail.lean:
+    if detail.grain:
         return f"svg: drawn in the smallest form to stay below {limit:,} bytes (coarse coordinates, colours, blurs)"
     blurs = f", blurs down to {detail.target:g} dB" if detail.target else ", blurs for all polygons"
     return f"svg: drawn coarser to stay below {limit:,} bytes (edges to {detail.levels:g} levels{blurs})"
-
-
-@lru_cache(maxsize=16)
-def _drawing(scene: Scene, profile: str, detail: Detail) -> Written:
-    additive = scene.compositing == "additive"
-    grain = detail.lean
-    canvas = Canvas.whole(scene, grain.units) if grain else Canvas.of(scene, detail.coarser)
-    document = Document(canvas, detail.named)
-    if scene.background is not None:
-        document.body.append(tag("rect", width="100%", height="100%", fill=color_text(scene.background)))
-    planned = plan(scene, document.canvas, detail, profile != PORTABLE)
-    if not additive:
-        off = {index: blurred.difference for index, blurred in planned.blurred.items()}
-        cut = [i for i, layer in enumerate(scene.layers) if i in off or is_banded(layer, canvas)]
-        scene = compensated(scene, off, cut, *((grain.colors, grain.opacities) if grain else ()))
-    painter = Painter(document, detail, planned)
-    if additive:
-        found = _add_terms(scene, document, painter)
-    else:
-        found = ()
-        drawn = (painter.draw(Part(layer, index)) for index, layer in enumerate(scene.layers))
-        elements = [element for element in drawn if element]
-        document.body += [tag("g", "\n".join(elements), **GROUP)] if grain and elements else elements
-    return Written(document, found)
-
-
-def _add_terms(scene: Scene, document: Document, painter: Painter) -> tuple[str, ...]:
-    """Adds all terms of a signed sum to the drawing; returns a note if some of it had to be cut off."""
-    ordered, lost = terms(scene) if scene.layers else ([], 0.0)
-
-    def draw(term: Term) -> str:
-        drawn = painter.draw(Part(term.layer, term.layer_index))
-        return tag("g", _ground(term, document.canvas), drawn, style=DIFFERENCE) if drawn else ""
-
-    inversion = tag("rect", width="100%", height="100%", fill="#fff", style=DIFFERENCE)
-    document.body += [element for element in alternating(ordered, draw, inversion) if element]
-    if lost < 1e-3:
-        return ()
-    decibels = -20.0 * math.log10(lost)
-    return (f"svg: sums leave the range of colours on the way and are cut off: {decibels:.0f} dB at most",)
-
-
-def _ground(term: Term, canvas: Canvas) -> str:
-    """Black below a term, which changes nothing; without it a translucent edge would not be subtracted in full."""
-    box = extent(term.layer).grown(2.0 / canvas.unit)
-    (left, top), (right, bottom) = np.clip(
-        canvas.places([box[:2], box[2:]]), (0.0, 0.0), (canvas.width, canvas.height)
-    ).tolist()
-    place = {"x": canvas.number(left), "y": canvas.number(top)}
-    return tag("rect", **place, width=canvas.number(right - left), height=canvas.number(bottom - top))

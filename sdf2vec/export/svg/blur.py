@@ -8,22 +8,23 @@ of its own is traced, and its contour moved until the blurred one lies where cov
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
-from functools import lru_cache
+from functools import cache
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
+from ...deferred import deferred
 from ...scene import Layer
-from ...shapes import KINDS, Outline
-from .bands import contours
-from .compensate import Difference
-from .field import Array, Grid, covers, distances, extent, grid_over
-from .outlines import Traced, core, distance_to, sharpened
+from ...shapes import Outline
+from .canvas import Canvas
+from .isobands import contours
+from .outlines import Traced, core, distance_to, edge_of, sharpened
+from .refit_appearance import Difference
+from .sampling import Array, SampleGrid, covers, distances, edge_profile, extent, grid_over
 
-GAUSSIAN = math.pi / math.sqrt(3.0) / 10.0  # standard deviation of the edge's logistic profile, in falloffs
 SHARES = (1.0, 0.7, 0.45, 0.2)  # of the corner radius that an offset outline has
 WIDTHS = (0.9, 1.0, 1.1)  # of the Gaussian
 # Standard deviations in user units, few so that shapes can share filters. At these the three boxes of the standard
@@ -35,6 +36,8 @@ TRACED_CELLS = 96, 256  # of a traced shape's
 ACROSS = 1.5  # of them in a standard deviation
 MOVES = 4  # of a traced contour to where its blur is one half
 LEAST = STEPS[0]  # librsvg blurs much too little below 2
+
+gaussian_filter: Callable[..., Array] = deferred("scipy.ndimage", "gaussian_filter")
 
 
 class Blurred(NamedTuple):
@@ -51,6 +54,14 @@ class Blurred(NamedTuple):
     difference: Difference
 
 
+@cache
+def deviation_of_edge() -> float:
+    """The standard deviation, in falloffs, of the logistic curve that is as steep in its middle as the edge."""
+    step = 1e-4
+    high, low = edge_profile(np.array([0.5 - step, 0.5 + step]))
+    return math.pi / math.sqrt(3.0) / 4.0 * 2.0 * step / float(high - low)
+
+
 def quantised(deviation: float) -> float:
     """The nearest standard deviation, in user units, that filters are made for."""
     if deviation > STEPS[-1]:
@@ -58,27 +69,22 @@ def quantised(deviation: float) -> float:
     return min(STEPS, key=lambda step: abs(math.log(step / deviation)))
 
 
-@lru_cache(maxsize=8192)
-def best_blur(layer: Layer, size: tuple[float, float, float]) -> Blurred | None:
-    """The blurred outline nearest to a layer's coverage; None where gradients say it exactly, or nothing is seen.
-
-    `size`: width, height and scene unit of the canvas, in user units.
-    """
-    outline_of = KINDS[layer.kind].outline
-    if outline_of is None or len(layer.shapes) > 1:
-        return _traced(layer, size)
-    outline = outline_of(0.5 * layer.falloff, *layer.shapes[0].named().values())
+def best_blur(layer: Layer, canvas: Canvas) -> Blurred | None:
+    """The blurred outline nearest to a layer's coverage; None where gradients say it exactly, or nothing is seen."""
+    outline = edge_of(layer, 0.5)
+    if outline is None:
+        return _traced(layer, canvas)
     if core(outline) is None:
         return None
-    trial = trial_of(layer, size)
+    trial = trial_of(layer, canvas)
     shares = [sharpened(outline, share) for share in SHARES]
     best = min(shares, key=lambda tried: trial.blurred(tried, 1.0).error)
     return nearest([trial.plain(outline), *(trial.blurred(best, width) for width in WIDTHS)])
 
 
-def _traced(layer: Layer, size: tuple[float, float, float]) -> Blurred | None:
+def _traced(layer: Layer, canvas: Canvas) -> Blurred | None:
     """The nearest blur of a contour of a layer that has no outline of its own."""
-    trial = trial_of(layer, size, *TRACED_CELLS)
+    trial = trial_of(layer, canvas, *TRACED_CELLS)
     field = distances(layer, trial.grid) - 0.5 * layer.falloff
     down, across = np.gradient(field, trial.grid.step)
     edge = trial.wanted * (1.0 - trial.wanted) * trial.seen
@@ -86,7 +92,8 @@ def _traced(layer: Layer, size: tuple[float, float, float]) -> Blurred | None:
         return None
     steep = max(float(np.sum(edge * np.hypot(down, across)) / edge.sum()), 0.1)  # 1 for a true distance
     tried = (found for width in WIDTHS for found in trial.moved(field / steep, width / steep))
-    return nearest([*tried, trial.plain(Traced(tuple(contours(field, 0.0, trial.grid))), field / steep)])
+    plain = Traced(tuple(contours(field, 0.0, trial.grid)))
+    return nearest([*tried, trial.judged(plain, field / steep, 0.0)])
 
 
 def nearest(tried: Sequence[Blurred]) -> Blurred:
@@ -100,19 +107,18 @@ class Trial:
     """A layer's coverage on a grid, to compare blurs with; only what lies on the canvas counts."""
 
     falloff: float
-    grid: Grid
+    grid: SampleGrid
     wanted: Array  # [Y, X]
     seen: NDArray[np.bool_]  # [Y, X]
     unit: float
 
     def blurred(self, outline: Outline, width: float) -> Blurred:
         """An outline whose blur is so many times as wide as the falloff asks for."""
-        deviation = self._deviation(width)
-        return self.judged(outline, distance_to(outline, self.grid), deviation)
+        return self.judged(outline, distance_to(outline, self.grid), self._deviation(width))
 
-    def plain(self, outline: Outline | Traced, distance: Array | None = None) -> Blurred:
-        """An outline without a blur, at these distances [Y, X] from its edge."""
-        return self.judged(outline, distance_to(outline, self.grid) if distance is None else distance, 0.0)
+    def plain(self, outline: Outline) -> Blurred:
+        """An outline without a blur."""
+        return self.judged(outline, distance_to(outline, self.grid), 0.0)
 
     def moved(self, field: Array, width: float) -> Iterator[Blurred]:
         """Contours of a field [Y, X] where it is 0, each nearer to where coverage is one half once it is blurred."""
@@ -123,7 +129,8 @@ class Trial:
             field = field + found.difference.off * deviation * math.sqrt(math.tau)
 
     def _deviation(self, width: float) -> float:
-        return quantised(max(width * GAUSSIAN * self.falloff * self.unit, LEAST)) / self.unit
+        wanted = width * deviation_of_edge() * self.falloff * self.unit
+        return quantised(max(wanted, LEAST)) / self.unit
 
     def judged(self, outline: Outline | Traced, distance: Array, deviation: float) -> Blurred:
         """An outline, drawn at these distances [Y, X] from its edge, and its errors."""
@@ -134,25 +141,16 @@ class Trial:
         return Blurred(outline, deviation, error, error_cut, Difference(self.grid, off))
 
     def _smooth(self, sharp: Array, deviation: float) -> Array:
-        from scipy.ndimage import gaussian_filter
-
         if not deviation:
             return sharp
-        return np.asarray(gaussian_filter(sharp, deviation / self.grid.step, mode="constant", truncate=3.5))
+        return gaussian_filter(sharp, deviation / self.grid.step, mode="constant", truncate=3.5)
 
 
-def trial_of(
-    layer: Layer, size: tuple[float, float, float], fewest: int = CELLS[0], most: int = CELLS[1]
-) -> Trial:
-    """What blurs of a layer are compared with, on a grid with so many cells along its longest side.
-
-    `size` as in `best_blur`.
-    """
-    width, height, unit = size
-    box = extent(layer)
-    longest = max(box.right - box.left, box.bottom - box.top)
-    fine = max(GAUSSIAN * layer.falloff, 0.5 / unit) / ACROSS
-    grid = grid_over(box, longest / min(max(longest / fine, fewest), most))
-    across, down = np.abs(grid.x) < width / unit / 2, np.abs(grid.y) < height / unit / 2
-    seen = down[:, None] & across[None, :]
-    return Trial(layer.falloff, grid, covers(layer, grid, 1.0 / unit), seen, unit)
+def trial_of(layer: Layer, canvas: Canvas, fewest: int = CELLS[0], most: int = CELLS[1]) -> Trial:
+    """What blurs of a layer are compared with, on a grid with so many cells along its longest side."""
+    unit, box = canvas.unit, extent(layer)
+    fine = max(deviation_of_edge() * layer.falloff, 0.5 / unit) / ACROSS
+    grid = grid_over(box, box.longest / min(max(box.longest / fine, fewest), most))
+    across = np.abs(grid.x) < canvas.width / unit / 2
+    down = np.abs(grid.y) < canvas.height / unit / 2
+    return Trial(layer.falloff, grid, covers(layer, grid, 1.0 / unit), down[:, None] & across[None, :], unit)

@@ -1,4 +1,4 @@
-"""Outlines as SVG elements, as polygons, and as distance fields."""
+"""Outlines in user units, as convex polygons with round corners, and as distances."""
 
 from __future__ import annotations
 
@@ -8,10 +8,12 @@ from functools import singledispatch
 
 import numpy as np
 
-from ...shapes import EllipseOutline, Outline, PolygonOutline, RectangleOutline
-from .canvas import Canvas, Points, tag
-from .curves import path_data
-from .field import Array, Grid
+from ...scene import Layer
+from ...shapes import KINDS, EllipseOutline, Outline, PolygonOutline, RectangleOutline
+from .bezier_fit import smooth_path
+from .canvas import Canvas, Points, pairs
+from .display import Geometry
+from .sampling import Array, SampleGrid
 
 FLAT = 1e-9  # scene units: a side shorter than this is none
 LONGEST_MITRE = 4.0  # in lengths that the sides are moved by
@@ -26,80 +28,53 @@ class Traced:
     tolerance: float = TOLERANCE
 
 
-# --- elements ----------------------------------------------------------------------------------------------
+def edge_of(layer: Layer, falloffs: float) -> Outline | None:
+    """The analytic contour of a single shape, so many falloffs outside; the one place that asks a kind for it."""
+    outline_of = KINDS[layer.shapes[0].kind].outline
+    if outline_of is None or len(layer.shapes) > 1:
+        return None
+    return outline_of(falloffs * layer.falloff, *layer.shapes[0].named().values())
 
 
 @singledispatch
-def element(outline: Outline | Traced, canvas: Canvas, **paint: str | None) -> str:
-    """The outline as one element."""
+def placed(outline: Outline | Traced, canvas: Canvas) -> Geometry:
+    """The outline in user units."""
     raise NotImplementedError(type(outline))
 
 
-@element.register
-def _(outline: EllipseOutline, canvas: Canvas, **paint: str | None) -> str:
-    ((x, y),) = canvas.places(outline.center).tolist()
-    rx, ry = (canvas.number(r * canvas.unit) for r in outline.radii)
-    center = {"cx": canvas.number(x), "cy": canvas.number(y)}
-    if rx == ry:
-        return tag("circle", **center, r=rx, **paint)
-    return tag("ellipse", **center, rx=rx, ry=ry, transform=turn(outline.angle, x, y, canvas), **paint)
+@placed.register
+def _(outline: EllipseOutline, canvas: Canvas) -> Geometry:
+    across, down = outline.radii
+    return EllipseOutline(
+        canvas.place(outline.center), (across * canvas.unit, down * canvas.unit), outline.angle
+    )
 
 
-@element.register
-def _(outline: RectangleOutline, canvas: Canvas, **paint: str | None) -> str:
-    ((x, y),) = canvas.places(outline.center).tolist()
-    half = np.array(outline.half_size) * canvas.unit
-    radius = canvas.number(outline.corner_radius * canvas.unit)
-    place = {
-        "x": canvas.number(x - half[0]),
-        "y": canvas.number(y - half[1]),
-        "width": canvas.number(2 * half[0]),
-        "height": canvas.number(2 * half[1]),
-        "rx": None if radius == "0" else radius,
-    }
-    return tag("rect", **place, transform=turn(outline.angle, x, y, canvas), **paint)
+@placed.register
+def _(outline: RectangleOutline, canvas: Canvas) -> Geometry:
+    across, down = outline.half_size
+    half = (across * canvas.unit, down * canvas.unit)
+    return RectangleOutline(
+        canvas.place(outline.center), half, outline.angle, outline.corner_radius * canvas.unit
+    )
 
 
-@element.register
-def _(outline: PolygonOutline, canvas: Canvas, **paint: str | None) -> str:
-    points = canvas.places(outline.points)
-    if outline.rounding * canvas.unit < 0.05:
-        return tag("polygon", points=canvas.joined(points), **paint)
-    return tag("path", d=_rounded_path(points, outline.rounding * canvas.unit, canvas), **paint)
+@placed.register
+def _(outline: PolygonOutline, canvas: Canvas) -> Geometry:
+    return PolygonOutline(pairs(canvas.places(outline.points)), outline.rounding * canvas.unit)
 
 
-@element.register
-def _(outline: Traced, canvas: Canvas, **paint: str | None) -> str:
-    contours = [canvas.places(contour) for contour in outline.contours]
-    return tag("path", d=path_data(contours, outline.tolerance, canvas), fill_rule="evenodd", **paint)
-
-
-def turn(angle: float, x: float, y: float, canvas: Canvas) -> str | None:
-    """A rotation about a point, None for none."""
-    degrees = canvas.fine(math.degrees(angle) % 180.0)
-    return None if degrees == "0" else f"rotate({degrees} {canvas.number(x)} {canvas.number(y)})"
+@placed.register
+def _(outline: Traced, canvas: Canvas) -> Geometry:
+    return smooth_path([canvas.places(contour) for contour in outline.contours], outline.tolerance, canvas)
 
 
 def upright(outline: Outline | Traced) -> Outline | Traced:
     """The same without a turned element: librsvg blurs what is turned by other widths."""
     if isinstance(outline, RectangleOutline) and outline.angle:
         points, rounding = core(outline) or (np.zeros((1, 2)), 0.0)
-        return PolygonOutline(tuple((x, y) for x, y in points.tolist()), rounding)
+        return PolygonOutline(pairs(points), rounding)
     return outline
-
-
-def _rounded_path(points: Points, rounding: float, canvas: Canvas) -> str:
-    """Straight edges moved outwards, joined by arcs."""
-    corners = convex(points)
-    moved = [(a + n * rounding, b + n * rounding) for a, b, n in sides(corners)] or [(points[0],) * 2]
-    # Half a circle must not be flattened because its ends were rounded towards each other; too small a radius grows.
-    radius = canvas.number(
-        rounding if len(corners) > 2 else max(rounding - 10.0**-canvas.digits, 0.5 * rounding)
-    )
-    arc = f"A{radius} {radius} 0 0 1 "
-    edges = [f"{canvas.joined(a[None])}L{canvas.joined(b[None])}" for a, b in moved]
-    first = canvas.joined(moved[0][0][None])
-    return "M" + arc.join(edges) + arc + first + "Z"
 
 
 # --- convex polygons ---------------------------------------------------------------------------------------
@@ -175,11 +150,10 @@ def _(outline: PolygonOutline, share: float) -> Outline:
     mitres = (normals + before) / np.maximum(1.0 + np.sum(normals * before, axis=1, keepdims=True), 1e-6)
     lengths = np.linalg.norm(mitres, axis=1, keepdims=True)
     mitres *= np.minimum(1.0, LONGEST_MITRE / np.maximum(lengths, FLAT))
-    points = (corners + moved * mitres).tolist()
-    return PolygonOutline(tuple((x, y) for x, y in points), outline.rounding * share)
+    return PolygonOutline(pairs(corners + moved * mitres), outline.rounding * share)
 
 
-def distance_to(outline: Outline | Traced, grid: Grid) -> Array:
+def distance_to(outline: Outline | Traced, grid: SampleGrid) -> Array:
     """Signed distances [Y, X] to an outline made of a convex polygon."""
     made = None if isinstance(outline, Traced) else core(outline)
     assert made is not None

@@ -3,32 +3,42 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from typing import TypeVar
+from typing import NamedTuple, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
+from ...deferred import deferred
 from ...scene import Scene
-from .field import Array
+from .sampling import Array
+
+pixel_points = deferred("sdf2vec.render.reference", "canvas")
+covers_at = deferred("sdf2vec.render.reference", "layers_at")
+from_scene = deferred("sdf2vec.render.tensors", "from_scene")
 
 Float = TypeVar("Float", np.float32, np.float64)
 
-SIDE = 128  # pixels along the shortest side of the picture that is weighed
-MOST = 1 << 24  # layers × pixels
+SIDE = 128  # pixels along the shortest side of the small canvas
+MOST = 1 << 23  # layers × pixels
 AT_ONCE = 1 << 20  # of them, for a formula holds dozens of numbers for each
 
 
-def contrasts(scene: Scene) -> Array:
+class LayerSamples(NamedTuple):
+    """Coverage [N, P] and colour [N, 3, P or 1] of all layers on a small canvas, P = width × height."""
+
+    covers: Array
+    colors: Array
+    width: int
+    height: int
+
+
+def contrasts(scene: Scene, samples: LayerSamples) -> Array:
     """[N]: the mean squared change of the picture, per channel, that an error 1 of each layer's coverage makes.
 
-    Under `over` it counts what lies below the layer and how much of it later layers hide; the mean is over the
-    layer's soft edge.
+    It counts what lies below the layer and how much of it later layers hide; the mean is over the layer's soft edge.
     """
-    covers, colors = layers_at(scene, SIDE)
+    covers, colors, *_ = samples
     soft = covers * (1.0 - covers) + 1e-3 * covers + 1e-9
-    if scene.compositing == "additive":
-        change = np.square(colors).mean(axis=1)
-        return np.asarray(np.sum(soft * change, axis=1) / soft.sum(axis=1))
     opacity = np.array([layer.opacity for layer in scene.layers])[:, None]
     alphas = covers * opacity
     through = showing(alphas) * opacity
@@ -62,26 +72,26 @@ def steps_over(alphas: NDArray[Float], colors: Array, ground: Array | None) -> I
         below = below + step * alpha
 
 
-def layers_at(scene: Scene, side: int, most: int = MOST) -> tuple[Array, Array]:
-    """Coverage [N, P] and colour [N, 3, P or 1] of all layers on a small canvas of the scene's shape."""
-    from ...render import reference
-    from ...render.tensors import from_scene
-
-    width, height = small_canvas(scene, side, most)
+def layers_at(scene: Scene) -> LayerSamples:
+    """All layers on a small canvas of the scene's shape."""
+    if not scene.layers:
+        return LayerSamples(np.zeros((0, 1)), np.zeros((0, 3, 1)), 1, 1)
+    width, height = _small_canvas(scene)
     tensors = from_scene(scene)
-    x, y, pixel = reference.canvas(tensors, width, height)
+    x, y, pixel = pixel_points(tensors, width, height)
     scale = min(width, height) / min(scene.width, scene.height)
     chunk = max(1, AT_ONCE // len(scene.layers))
     chunks = zip(x.split(chunk), y.split(chunk), strict=True)
-    parts = [reference.layers_at(tensors, own_x, own_y, pixel * scale) for own_x, own_y in chunks]
+    parts = [covers_at(tensors, own_x, own_y, pixel * scale) for own_x, own_y in chunks]
     covers = np.concatenate([cover.numpy() for cover, _ in parts], axis=1, dtype=np.float64)
     colors = [color.double().numpy() for _, color in parts]
-    return covers, colors[0] if colors[0].shape[2] == 1 else np.concatenate(colors, axis=2)
+    flat = colors[0].shape[2] == 1
+    return LayerSamples(covers, colors[0] if flat else np.concatenate(colors, axis=2), width, height)
 
 
-def small_canvas(scene: Scene, side: int, most: int = MOST) -> tuple[int, int]:
-    """Width and height of a canvas with `side` pixels along its shortest, fewer where there are many layers."""
+def _small_canvas(scene: Scene) -> tuple[int, int]:
+    """Width and height of a canvas with SIDE pixels along its shortest, fewer where there are many layers."""
     shortest = min(scene.width, scene.height)
-    allowed = (most / max(1, len(scene.layers)) * shortest**2 / (scene.width * scene.height)) ** 0.5
-    scale = min(side, max(8, int(allowed)), shortest) / shortest
+    allowed = (MOST / len(scene.layers) * shortest**2 / (scene.width * scene.height)) ** 0.5
+    scale = min(SIDE, max(8, int(allowed)), shortest) / shortest
     return max(1, round(scene.width * scale)), max(1, round(scene.height * scale))

@@ -1,4 +1,4 @@
-"""A smooth union of several colours: a piece for each shape, laid on each other so that they mix to the union.
+"""A smooth union of several colours: a part for each shape, laid on each other so that they mix to the union.
 
 What shape i has to show is coverage · wᵢ, its share of the colour. Laid over those before it, it needs the alpha
 aᵢ = coverage·wᵢ / (1 − Σ coverage·wⱼ), the sum over the shapes above. Each aᵢ is drawn as bands, like any soft edge.
@@ -11,31 +11,24 @@ from dataclasses import replace
 import numpy as np
 
 from ...scene import Layer
-from .bands import contours, seen, trace_grid
-from .canvas import Canvas, Points
-from .field import Array, Grid, colors, covers
+from .canvas import Canvas
+from .isobands import Band, band_edges, isobands, trace_grid
+from .sampling import Array, SampleGrid, colors, covers
 
 LEAST = 1e-6
 
 
-def piece_contours(layer: Layer, count: int, canvas: Canvas) -> list[list[tuple[float, list[Points]]]]:
-    """For each shape, lowest first: alpha and the contours, in user units, of `count` bands and the core."""
-    box = seen(layer, canvas)
-    if box.empty:
+def part_bands(layer: Layer, count: int, canvas: Canvas) -> list[list[Band]]:
+    """The bands of each shape's part, lowest first."""
+    grid = trace_grid(layer, canvas)
+    if grid is None:
         return [[] for _ in layer.shapes]
-    grid = trace_grid(box, layer.falloff)
-    edges = ((np.arange(count + 1) + 0.5) / (count + 1)).tolist()
-    return [
-        [
-            ((i + 1) / (count + 1), [canvas.places(c) for c in contours(-alpha, -edge, grid)])
-            for i, edge in enumerate(edges)
-        ]
-        for alpha in alphas(layer, grid, 1.0 / canvas.unit)
-    ]
+    levels = [-edge for edge in band_edges(count)]
+    return [isobands(-alpha, levels, grid, canvas) for alpha in alphas(layer, grid, 1.0 / canvas.unit)]
 
 
-def alphas(layer: Layer, grid: Grid, pixel: float) -> list[Array]:
-    """The alpha [Y, X] of each shape's piece, lowest first."""
+def alphas(layer: Layer, grid: SampleGrid, pixel: float) -> list[Array]:
+    """The alpha [Y, X] of each shape's part, lowest first."""
     cover = covers(layer, grid, pixel)
     found, above = [], np.zeros_like(cover)
     for share in reversed(shares(layer, grid)):
@@ -45,7 +38,7 @@ def alphas(layer: Layer, grid: Grid, pixel: float) -> list[Array]:
     return found[::-1]
 
 
-def shares(layer: Layer, grid: Grid) -> list[Array]:
+def shares(layer: Layer, grid: SampleGrid) -> list[Array]:
     """How much of each shape's colour the union has at each point [Y, X]; they add up to 1."""
     found: list[Array] = []
     for first in range(0, len(layer.shapes), 3):  # three at a time, as red, green and blue

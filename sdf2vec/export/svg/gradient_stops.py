@@ -5,22 +5,10 @@ from __future__ import annotations
 from functools import cache
 
 import numpy as np
-from numpy.typing import NDArray
 
-from ...blend import CUTOFF, REACH, STEEPNESS
-from .canvas import number, tag
-
-SOFT = 0.5 + REACH  # where coverage ends, in falloffs from the edge; it begins to sink at 0.5 − REACH
+from .sampling import edge_profile, edge_range
 
 FEWEST, MOST = 5, 16  # stops of an edge
-
-Array = NDArray[np.float64]
-
-
-def edge_profile(distance: Array) -> Array:
-    """Coverage by distance in falloffs: the curve that the gradients follow."""
-    z = STEEPNESS * (0.5 - distance)
-    return np.clip((1.0 / (1.0 + np.exp(-z)) - CUTOFF) / (1.0 - 2.0 * CUTOFF), 0.0, 1.0)
 
 
 @cache
@@ -30,7 +18,7 @@ def edge_stops(start: float, count: int) -> tuple[tuple[float, float], ...]:
     Places are dense where the curve bends; the values are those of the broken line nearest to the curve
     (least squares), which halves the error of a line through the curve's own points.
     """
-    x = np.linspace(start, SOFT, 2001)
+    x = np.linspace(start, edge_range()[1], 2001)
     y = edge_profile(x)
     bend = np.abs(np.gradient(np.gradient(y, x), x)) ** 0.4 + 1e-3
     total = np.concatenate([[0.0], np.cumsum((bend[1:] + bend[:-1]) / 2)])
@@ -47,25 +35,13 @@ def stop_count(contrast: float, levels: float) -> int:
     `contrast` is the mean squared change of the picture where coverage goes from 0 to 1.
     """
     worst = 255.0 * contrast**0.5
-    return next((n for n in range(FEWEST, MOST) if worst * stops_error(n) <= levels), MOST)
+    return next((n for n in range(FEWEST, MOST) if worst * _stops_error(n) <= levels), MOST)
 
 
 @cache
-def stops_error(count: int) -> float:
+def _stops_error(count: int) -> float:
     """Root mean square error of coverage along an edge drawn with so many stops."""
-    x = np.linspace(0.0, SOFT, 1001)
+    x = np.linspace(0.0, edge_range()[1], 1001)
     places, values = np.array(edge_stops(0.0, count)).T
     drawn = np.interp(x, places, values)
     return float(np.sqrt(np.mean((drawn - edge_profile(x)) ** 2)))
-
-
-def stop_elements(offsets: list[tuple[float, float]], color: str) -> list[str]:
-    """Stops from pairs of offset 0..1 and opacity 0..1."""
-    return [
-        tag("stop", offset=number(offset, 3), stop_color=color, stop_opacity=_opacity(value))
-        for offset, value in offsets
-    ]
-
-
-def _opacity(value: float) -> str | None:
-    return None if value >= 0.9995 else number(value, 3)

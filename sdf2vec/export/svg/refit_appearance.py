@@ -9,19 +9,18 @@ to what it was and within its range.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
+from ...deferred import deferred
 from ...scene import Layer, Scene
-from .field import Array, Grid
-from .weigh import layers_at, showing, small_canvas, steps_over
+from .sampling import Array, SampleGrid
+from .visibility import LayerSamples, showing, steps_over
 
-SIDE = 128  # pixels along the shortest side of the picture that is solved for
-MOST = 1 << 23  # layers × pixels
 CELLS = 64  # of a difference that is kept, along its longest side
 LARGEST = 2048  # layers: more equations than these are not solved
 ROUNDS = 3  # of opacities, then colours
@@ -34,11 +33,13 @@ ROUNDING = (
 
 Single = NDArray[np.float32]
 
+map_coordinates: Callable[..., Array] = deferred("scipy.ndimage", "map_coordinates")
+
 
 class Difference(NamedTuple):
     """Drawn coverage minus the layer's own, [Y, X] on a grid."""
 
-    grid: Grid
+    grid: SampleGrid
     off: Array | Single
 
     def coarse(self) -> Difference:
@@ -52,11 +53,12 @@ class Difference(NamedTuple):
             axis[0] + (np.arange(count) * block + middle) * step
             for axis, count in ((self.grid.x, columns), (self.grid.y, rows))
         )
-        return Difference(Grid(x, y, step * block), means)
+        return Difference(SampleGrid(x, y, step * block), means)
 
 
-def compensated(
+def refitted(
     scene: Scene,
+    samples: LayerSamples,
     drawn: Mapping[int, Difference],
     cut: Sequence[int] = (),
     colors: int = 0,
@@ -68,9 +70,9 @@ def compensated(
     to 8 bits. `colors`, `opacities`: these become whole numbers of so many steps; the colours are chosen together,
     so that the error of one makes up for another's. 0 leaves them free. Only `over`.
     """
-    if not scene.layers or len(scene.layers) > LARGEST or not (drawn or cut or colors):
+    if not 0 < len(scene.layers) <= LARGEST or not (drawn or cut or colors):
         return scene
-    stack, wanted = _stack(scene, drawn, cut)
+    stack, wanted = _stack(scene, samples, drawn, cut)
     best, least = stack, stack.error(wanted)
     for _ in range(ROUNDS if drawn or cut else 0):
         stack = stack.with_opacities(wanted).with_colors(wanted)
@@ -186,14 +188,15 @@ class Stack:
         return replace(self, colors=colors)
 
 
-def _stack(scene: Scene, drawn: Mapping[int, Difference], cut: Sequence[int]) -> tuple[Stack, Array]:
+def _stack(
+    scene: Scene, samples: LayerSamples, drawn: Mapping[int, Difference], cut: Sequence[int]
+) -> tuple[Stack, Array]:
     """The scene's layers as they are drawn, and its render, on a small canvas."""
-    covers, colors = layers_at(scene, SIDE, MOST)
+    covers, colors, width, height = samples
     ground = None if scene.background is None else np.array(scene.background)
     opacities = np.array([layer.opacity for layer in scene.layers])
     plain = np.array([len({shape.color for shape in layer.shapes}) == 1 for layer in scene.layers])
     exact = Stack(covers.astype(np.float32), colors, opacities, ground, plain, (colors, opacities))
-    width, height = small_canvas(scene, SIDE, MOST)
     x = (np.arange(width) + 0.5 - width / 2) / min(width, height)
     y = (np.arange(height) + 0.5 - height / 2) / min(width, height)
     off = exact.covers.copy()
@@ -208,8 +211,6 @@ def _stack(scene: Scene, drawn: Mapping[int, Difference], cut: Sequence[int]) ->
 
 def _add(difference: Difference, x: Array, y: Array, cover: Single) -> None:
     """Adds a difference to coverage [Y, X] at the places x and y, interpolated."""
-    from scipy.ndimage import map_coordinates
-
     grid, off = difference
     across, down = (x - grid.x[0]) / grid.step, (y - grid.y[0]) / grid.step
     columns = np.flatnonzero((across > -0.5) & (across < len(grid.x) - 0.5))

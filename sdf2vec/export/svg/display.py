@@ -1,0 +1,111 @@
+"""A drawing as data: a display list, from which any vector format can be written.
+
+Lengths and points (x, y) are in user units, y down; angles in radians, clockwise on the screen; colours sRGB-coded,
+0..1. Later items lie on earlier ones.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import NamedTuple
+
+from ...scene import Color
+from ...shapes import Outline, Point
+
+Segment = tuple[Point, ...]  # a Bézier curve without its start: one point is a line, three are a cubic
+
+
+class Contour(NamedTuple):
+    """A closed line."""
+
+    start: Point
+    segments: tuple[Segment, ...]
+
+
+@dataclass(frozen=True)
+class Path:
+    """What lies within an odd number of contours."""
+
+    contours: tuple[Contour, ...]
+
+
+Geometry = Outline | Path
+
+
+class Stop(NamedTuple):
+    """A colour and its opacity at an offset 0..1 of a gradient."""
+
+    offset: float
+    color: Color
+    opacity: float = 1.0
+
+
+@dataclass(frozen=True)
+class LinearGradient:
+    """From one point to another."""
+
+    start: Point
+    end: Point
+    stops: tuple[Stop, ...]
+
+
+@dataclass(frozen=True)
+class RadialGradient:
+    """From the centre of an ellipse to its rim; its own axes are turned by `angle`."""
+
+    center: Point
+    radii: Point
+    stops: tuple[Stop, ...]
+    angle: float = 0.0
+
+
+Fill = Color | LinearGradient | RadialGradient
+
+
+@dataclass(frozen=True)
+class Figure:
+    """A filled geometry, blurred by a Gaussian of the standard deviation `blur`.
+
+    Where it is not antialiased, a pixel belongs to it whose centre does.
+    """
+
+    geometry: Geometry
+    fill: Fill
+    opacity: float = 1.0
+    blur: float = 0.0
+    antialiased: bool = True
+    name: str = ""
+
+
+@dataclass(frozen=True)
+class Group:
+    """Items composited by themselves, then laid on what is below as one."""
+
+    items: tuple[Figure, ...]
+    opacity: float = 1.0
+    name: str = ""
+
+
+Item = Figure | Group
+
+
+@dataclass(frozen=True)
+class Drawing:
+    """A canvas of `width` × `height`, shown `scale` pixels a user unit, on a ground or none.
+
+    Coordinates tell to so many decimal `digits`.
+    """
+
+    width: float
+    height: float
+    scale: float
+    digits: int
+    ground: Color | None
+    items: tuple[Item, ...]
+
+
+def moved(color: Sequence[float], levels: float) -> Color:
+    """A colour with so many 8-bit levels more in all channels."""
+    red, green, blue = (channel + levels / 255.0 for channel in color)
+    return red, green, blue

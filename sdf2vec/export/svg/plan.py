@@ -1,0 +1,148 @@
+"""How finely a drawing is made, and which construction each layer gets."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from functools import cached_property
+
+import numpy as np
+
+from ...scene import Layer, Scene
+from .blur import Blurred, best_blur
+from .canvas import Canvas
+from .compact import GRAINS, Grain, compact_blurs
+from .gradient_stops import stop_count
+from .isobands import band_count
+from .outlines import edge_of
+from .sampling import Array
+from .visibility import LayerSamples, contrasts, layers_at
+
+SHARP = 2.0  # pixels: an edge softer than this is drawn soft
+SMALL = 64.0  # pixels along the shortest side: a picture smaller than this will be shown larger
+CUT = 4.0  # times as bad as others is the error of what the canvas' edge cuts off: there all layers err alike
+BANDS_COARSER = 4.0  # bands are dear, and their steps alternate in sign
+SHOWN = 512.0  # pixels along the shortest side, at least, that a drawing is expected to be shown at
+
+
+@dataclass(frozen=True)
+class Detail:
+    """How finely a drawing is made. `target` is the nearness in dB for which blurs are given up.
+
+    `levels`: the error, in 8-bit levels, that the stops of one shape's edge may leave, and times
+    BANDS_COARSER the bands of a traced one. `coarser`: decimals fewer. `named`: names on shapes.
+    `grain`: nothing but blurs, in the smallest text, so coarse.
+    """
+
+    target: float = 47.0
+    levels: float = 0.2
+    coarser: int = 0
+    named: bool = True
+    grain: Grain | None = None
+
+
+# From what looks like the render to what is small. Names go last, for they are what a person edits by.
+DETAILS = (
+    Detail(),
+    Detail(target=43.0, levels=0.3),
+    Detail(target=40.0, levels=0.5),
+    Detail(target=37.0, levels=0.8, coarser=1),
+    Detail(target=34.0, levels=1.2, coarser=1),
+    Detail(target=30.0, levels=2.0, coarser=1, named=False),
+    Detail(target=0.0, levels=4.0, coarser=1, named=False),
+    *(Detail(target=0.0, levels=4.0, named=False, grain=grain) for grain in GRAINS),
+)
+
+
+@dataclass(frozen=True)
+class Plan:
+    """The canvas, which layers are soft, which are drawn by a blur, how many stops or bands each layer's edge has.
+
+    `rings`: whether wide bands are rings.
+    """
+
+    canvas: Canvas
+    soft: list[bool]
+    blurred: Mapping[int, Blurred]
+    stops: list[int]
+    bands: list[int]
+    rings: bool
+    samples: LayerSamples
+
+    def is_rounded_down(self, index: int, layer: Layer) -> bool:
+        """Whether a layer is drawn by what 8 bits take from most: a blur, or bands."""
+        return index in self.blurred or (self.soft[index] and edge_of(layer, 0.0) is None)
+
+
+@dataclass
+class Planner:
+    """What the drawings of a scene in all details have in common, found out when first needed."""
+
+    scene: Scene
+    filters: bool
+    canvas: Canvas = field(init=False)
+
+    def __post_init__(self) -> None:
+        self.canvas = Canvas.of(self.scene)
+        side = self.canvas.unit
+        softest = SHARP * min(1.0, side / SMALL)
+        self.soft = [layer.falloff * side > softest for layer in self.scene.layers]
+
+    @cached_property
+    def samples(self) -> LayerSamples:
+        return layers_at(self.scene)
+
+    @cached_property
+    def weights(self) -> Array:
+        return contrasts(self.scene, self.samples)
+
+    @cached_property
+    def blurs(self) -> dict[int, Blurred]:
+        """The nearest blur of each soft layer."""
+        return self._blurs([index for index, soft in enumerate(self.soft) if soft])
+
+    @cached_property
+    def traced(self) -> dict[int, Blurred]:
+        """The nearest contour of each sharp layer that has no outline of its own."""
+        sharp = (index for index, soft in enumerate(self.soft) if not soft)
+        return self._blurs([index for index in sharp if edge_of(self.scene.layers[index], 0.5) is None])
+
+    def _blurs(self, indices: Sequence[int]) -> dict[int, Blurred]:
+        tried = {index: best_blur(self.scene.layers[index], self.canvas) for index in indices}
+        return {index: blurred for index, blurred in tried.items() if blurred is not None}
+
+    @property
+    def details(self) -> list[Detail]:
+        """The details that a drawing may have, finest first."""
+        compact = self.filters or not any(self.soft)
+        return [detail for detail in DETAILS if compact or not detail.grain]
+
+    def plan(self, detail: Detail) -> Plan:
+        """The cheapest constructions that keep to what is allowed."""
+        scene, grain = self.scene, detail.grain
+        stops = [stop_count(weight, detail.levels) for weight in self.weights.tolist()]
+        side = max(self.canvas.unit, SHOWN)
+        bands = [
+            band_count(weight, BANDS_COARSER * detail.levels, layer.falloff * side)
+            for weight, layer in zip(self.weights.tolist(), scene.layers, strict=True)
+        ]
+        if grain:
+            canvas = Canvas.whole(scene, grain.units)
+            blurred = compact_blurs(scene, self.soft, self.blurs | self.traced, grain, canvas)
+        else:
+            canvas = Canvas.of(scene, detail.coarser)
+            blurred = self._near_enough(detail.target) if self.filters else {}
+        return Plan(canvas, self.soft, blurred, stops, bands, self.filters, self.samples)
+
+    def _near_enough(self, target: float) -> dict[int, Blurred]:
+        """The blurs of soft layers but the worst, which are given up until the target in dB is reached."""
+        found = self.blurs
+        energy = {index: _worst(blurred) * float(self.weights[index]) for index, blurred in found.items()}
+        allowed = 10 ** (-target / 10) * self.scene.extent[0] * self.scene.extent[1]
+        kept = sorted(energy, key=lambda index: (energy[index], index))
+        total = np.cumsum([energy[index] for index in kept])
+        return {index: found[index] for index, sum_ in zip(kept, total, strict=True) if sum_ <= allowed}
+
+
+def _worst(blurred: Blurred) -> float:
+    return max(blurred.error, CUT * blurred.error_cut if blurred.error_cut > 2.0 * blurred.error else 0.0)

@@ -1,0 +1,372 @@
+"""The display list as SVG text, by svgwrite: what is said once for many, ids, classes, numbers."""
+
+from __future__ import annotations
+
+import hashlib
+import math
+import re
+from collections import Counter
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from functools import singledispatchmethod
+from typing import Any
+from xml.etree import ElementTree
+from xml.sax.saxutils import escape
+
+import numpy as np
+import svgwrite
+
+from ...scene import Color
+from ...shapes import EllipseOutline, PolygonOutline, RectangleOutline
+from .canvas import Points, pairs
+from .display import (
+    Contour,
+    Drawing,
+    Figure,
+    Geometry,
+    Item,
+    LinearGradient,
+    Path,
+    RadialGradient,
+    Stop,
+)
+from .outlines import convex, sides
+
+Element = Any  # svgwrite has no types
+Attributes = dict[str, str | None]
+
+PREFIX = "@@"  # of ids, until the content that makes it is known
+NEEDLESS = ("version", "baseProfile", "xmlns:ev", "xmlns:xlink")  # that svgwrite puts at the root
+SHARED = ("fill", "fill-rule", "shape-rendering")  # attributes that a group says for all its items
+REACH = 3.0  # standard deviations that a blur reaches
+FLAT = 0.05  # user units: a rounding below it is none
+MARGINS = (0.1, 0.2, 0.3, 0.45, 0.6, 0.8, 1.1, 1.5, 2.0, 3.0, 4.5, 7.0, 10.0, 20.0, 50.0, 100.0)
+STROKES = {"fill": "currentColor", "stroke": "currentColor", "stroke-width": "0", "stroke-linejoin": "round"}
+
+
+@dataclass(frozen=True)
+class Style:
+    """How a drawing is written. `named`: with the figures' names as ids.
+
+    `compact`: each figure with as few words as there are. Colour is `currentColor`, said once, the softness a class,
+    a polygon's rounding a stroke. `margins`: of filters, in shares of the element's box.
+    """
+
+    named: bool = True
+    compact: bool = False
+    margins: Sequence[float] = MARGINS
+
+
+def written(drawing: Drawing, title: str, style: Style) -> str:
+    """The whole SVG. Ids begin with a hash of the content, so that drawings can share a page."""
+    inner = _Writer(drawing, style).text()
+    prefix = "s" + hashlib.sha256(inner.encode()).hexdigest()[:5]
+    head, rest = inner.replace(PREFIX, prefix).split(">", 1)
+    return f"{head}>\n<title>{escape(title)}</title>{rest}\n"
+
+
+class _Writer:
+    """The growing document: definitions and classes, each said once however often it is used."""
+
+    def __init__(self, drawing: Drawing, style: Style) -> None:
+        self.drawing = drawing
+        self.style = style
+        width, height = drawing.width, drawing.height
+        self.svg = svgwrite.Drawing(
+            size=(number(width * drawing.scale, 4), number(height * drawing.scale, 4)),
+            viewBox=f"0 0 {number(width, 4)} {number(height, 4)}",
+            role="img",
+            debug=False,
+        )
+        self.ids: dict[str, str] = {}
+        self.classes: dict[str, str] = {}
+        self.roundings = _usual_roundings(drawing.items)
+
+    def text(self) -> str:
+        """The document without its title, ids with PREFIX."""
+        drawing, body = self.drawing, self.svg
+        if drawing.ground is not None:
+            body.add(body.rect((None, None), ("100%", "100%"), fill=color_text(drawing.ground)))
+        items = [self.item(item) for item in drawing.items]
+        if self.style.compact and items:
+            body = self.svg.add(self.svg.g(**STROKES))
+        for item in items:
+            body.add(item)
+        if self.classes:
+            rules = "".join(f".{name}{{{rule}}}" for rule, name in self.classes.items())
+            self.svg.elements.insert(1, self.svg.style(rules))
+        if not self.svg.defs.elements:
+            self.svg.elements.remove(self.svg.defs)
+        return _lean(self.svg.get_xml())
+
+    def item(self, item: Item) -> Element:
+        """A figure or a group; what a group's figures have in common is said by it."""
+        name = f"{PREFIX}{item.name}" if self.style.named and item.name else None
+        if isinstance(item, Figure):
+            return self.element(item.geometry, self._look(item) | {"id": name})
+        group = self.svg.g(opacity=opacity_text(item.opacity), id=name)
+        made = [self.element(figure.geometry, self._painted(figure)) for figure in item.items]
+        for key in SHARED:
+            values = {element.attribs.get(key) for element in made}
+            if len(values) == 1 and None not in values:
+                group[key] = values.pop()
+                for element in made:
+                    del element.attribs[key]
+        for element in made:
+            group.add(element)
+        return group
+
+    # --- how a figure looks ---------------------------------------------------------------------------------
+
+    def _look(self, figure: Figure) -> Attributes:
+        """The attributes of a figure that is in no group."""
+        if not self.style.compact:
+            return self._painted(figure)
+        assert isinstance(figure.fill, tuple)
+        look: Attributes = {"color": color_text(figure.fill), "opacity": opacity_text(figure.opacity)}
+        rounding = _rounding(figure)
+        stroke = self.number(2.0 * rounding) if rounding else None
+        if figure.blur:
+            usual = stroke and rounding == self.roundings.get(figure.blur)
+            rule = f";stroke-width:{stroke}" if usual else ""
+            look["class"] = self._class(f"filter:{self._filter(figure)}{rule}")
+            stroke = None if usual else stroke
+        return look | {"stroke-width": stroke}
+
+    def _painted(self, figure: Figure) -> Attributes:
+        look: Attributes = {"fill": self.paint(figure.fill, figure)}
+        if figure.blur:
+            look["filter"] = self._filter(figure)
+        else:
+            key = "fill-opacity" if isinstance(figure.fill, tuple) else "opacity"
+            look[key] = opacity_text(figure.opacity)
+        if not figure.antialiased:
+            look["shape-rendering"] = "crispEdges"
+        return look
+
+    @singledispatchmethod
+    def paint(self, fill: Color, figure: Figure) -> str:
+        """A fill as an attribute's value."""
+        return color_text(fill)
+
+    @paint.register
+    def _(self, fill: LinearGradient, figure: Figure) -> str:
+        start, end = ((self.fine(x), self.fine(y)) for x, y in (fill.start, fill.end))
+        made = self.svg.linearGradient(start, end, gradientUnits="userSpaceOnUse")
+        return self._gradient(made, fill.stops)
+
+    @paint.register
+    def _(self, fill: RadialGradient, figure: Figure) -> str:
+        """Within an ellipse of its own in the ellipse's units.
+
+        Not in shares of its box, where that is no square: librsvg mistakes gradients that are stretched with a box.
+        """
+        (x, y), (across, down) = fill.center, fill.radii
+        own = isinstance(figure.geometry, EllipseOutline)
+        if own and self.number(across) == self.number(down):
+            return self._gradient(self.svg.radialGradient(), fill.stops)
+        center = ("0", "0") if own else (self.number(x), self.number(y))
+        squeeze = f"scale(1 {number(down / across, 5)})" if own else None
+        made = self.svg.radialGradient(center, self.number(across), gradientUnits="userSpaceOnUse")
+        made["gradientTransform"] = squeeze
+        return self._gradient(made, fill.stops)
+
+    def _gradient(self, gradient: Element, stops: Sequence[Stop]) -> str:
+        for offset, color, opacity in stops:
+            gradient.add_stop_color(number(offset, 3), color_text(color), opacity_text(opacity))
+        return self._defined("g", gradient)
+
+    def _filter(self, figure: Figure) -> str:
+        """A blur, in a region in shares of the element's box, so that figures can share it.
+
+        The opacity is part of it, for browsers round an attribute's down; not of a class, which all opacities share.
+        """
+        across, down = self._margins(figure)
+        region = {"x": number(-across, 2), "y": number(-down, 2)}
+        size = {"width": number(1.0 + 2.0 * across, 2), "height": number(1.0 + 2.0 * down, 2)}
+        made = self.svg.filter(color_interpolation_filters="sRGB", **region, **size)
+        made.feGaussianBlur(None, stdDeviation=self.fine(figure.blur))
+        opacity = opacity_text(figure.opacity)
+        if opacity is not None and not self.style.compact:
+            made.feComponentTransfer(None).feFuncA("linear", slope=opacity)
+        return self._defined("b", made)
+
+    def _margins(self, figure: Figure) -> tuple[float, float]:
+        """How far a blur reaches beyond an element's box, in its sides."""
+        rounding = _rounding(figure)
+        grown, stroked = (0.0, rounding) if self.style.compact else (rounding, 0.0)
+        wanted = (REACH * figure.blur + stroked) / np.maximum(box_of(figure.geometry) + 2.0 * grown, 0.1)
+        across, down = (self._margin(share) for share in wanted.tolist())
+        return (max(across, down),) * 2 if self.style.compact else (across, down)
+
+    def _margin(self, share: float) -> float:
+        margins = self.style.margins
+        return next((step for step in margins if step >= share), margins[-1])
+
+    def _defined(self, letter: str, definition: Element) -> str:
+        """A reference to a definition; the same one as before for equal content."""
+        content = definition.tostring()
+        if content not in self.ids:
+            self.ids[content] = f"{PREFIX}{letter}{len(self.ids) + 1}"
+            definition["id"] = self.ids[content]
+            self.svg.defs.add(definition)
+        return f"url(#{self.ids[content]})"
+
+    def _class(self, rule: str) -> str:
+        return self.classes.setdefault(rule, f"{PREFIX}{_letters(len(self.classes))}")
+
+    # --- geometry -------------------------------------------------------------------------------------------
+
+    @singledispatchmethod
+    def element(self, geometry: Geometry, look: Attributes) -> Element:
+        """A geometry as one element."""
+        raise NotImplementedError(type(geometry))
+
+    @element.register
+    def _(self, geometry: EllipseOutline, look: Attributes) -> Element:
+        (x, y), (across, down) = map(self.number, geometry.center), map(self.number, geometry.radii)
+        if across == down:
+            return self._with(self.svg.circle((x, y), across), look)
+        turned = self.fine(math.degrees(geometry.angle) % 180.0)
+        turn = "" if turned == "0" else f"rotate({turned})"
+        made = self.svg.ellipse((None, None), (across, down), transform=f"translate({x} {y}){turn}")
+        return self._with(made, look)
+
+    @element.register
+    def _(self, geometry: RectangleOutline, look: Attributes) -> Element:
+        (x, y), (across, down) = geometry.center, geometry.half_size
+        radius = self.number(geometry.corner_radius)
+        turned = self.fine(math.degrees(geometry.angle) % 180.0)
+        turn = None if turned == "0" else f"rotate({turned} {self.number(x)} {self.number(y)})"
+        corner = (self.number(x - across), self.number(y - down))
+        size = (self.number(2.0 * across), self.number(2.0 * down))
+        made = self.svg.rect(corner, size, None if radius == "0" else radius, transform=turn)
+        return self._with(made, look)
+
+    @element.register
+    def _(self, geometry: PolygonOutline, look: Attributes) -> Element:
+        points = np.array(geometry.points)
+        if self.style.compact:
+            turned = (np.roll(points, -first, axis=0) for first in range(len(points)))
+            data = min((self._relative(_polygon(corners)) for corners in turned), key=len)
+        elif geometry.rounding < FLAT:
+            data = f"M{self._joined(points)}Z"
+        else:
+            data = self._rounded(points, geometry.rounding)
+        return self._with(self.svg.path(data), look)
+
+    @element.register
+    def _(self, geometry: Path, look: Attributes) -> Element:
+        data = "".join(map(self._relative, geometry.contours))
+        return self._with(self.svg.path(data), look | {"fill-rule": "evenodd"})
+
+    def _with(self, element: Element, look: Mapping[str, str | None]) -> Element:
+        element.attribs.update({key: value for key, value in look.items() if value is not None})
+        return element
+
+    def _rounded(self, points: Points, rounding: float) -> str:
+        """Straight edges moved outwards, joined by arcs."""
+        corners = convex(points)
+        moved = [(a + n * rounding, b + n * rounding) for a, b, n in sides(corners)] or [(points[0],) * 2]
+        # Half a circle must not be flattened because its ends were rounded towards each other; a small radius grows.
+        least = max(rounding - 10.0**-self.drawing.digits, 0.5 * rounding)
+        radius = self.number(rounding if len(corners) > 2 else least)
+        arc = f"A{radius} {radius} 0 0 1 "
+        edges = [f"{self._joined(a[None])}L{self._joined(b[None])}" for a, b in moved]
+        return f"M{arc.join(edges)}{arc}{self._joined(moved[0][0][None])}Z"
+
+    def _joined(self, points: Points) -> str:
+        return " ".join(f"{self.number(x)} {self.number(y)}" for x, y in points.tolist())
+
+    def _relative(self, contour: Contour) -> str:
+        """Path data by how far each point is from where its segment begins; rounding does not add up."""
+        x, y = contour.start
+        parts, last = [f"M{self.fine(x)} {self.fine(y)}"], ""
+        for segment in contour.segments:
+            steps = [
+                (round(a - x, self.drawing.digits), round(b - y, self.drawing.digits)) for a, b in segment
+            ]
+            letter = "l" if len(segment) == 1 else "c"
+            values = " ".join(self.number(value) for step in steps for value in step)
+            parts.append((letter if letter != last else " ") + values)
+            x, y, last = x + steps[-1][0], y + steps[-1][1], letter
+        return "".join(parts).replace(" -", "-") + "z"
+
+    # --- numbers --------------------------------------------------------------------------------------------
+
+    def number(self, value: float) -> str:
+        """A coordinate or a length."""
+        return number(value, self.drawing.digits)
+
+    def fine(self, value: float) -> str:
+        """A number that directions hang on: with two decimals more."""
+        return number(value, self.drawing.digits + 2)
+
+
+def _rounding(figure: Figure) -> float:
+    return figure.geometry.rounding if isinstance(figure.geometry, PolygonOutline) else 0.0
+
+
+def _usual_roundings(items: Sequence[Item]) -> dict[float, float]:
+    """For each blur the rounding that most of its figures have."""
+    figures = [item for item in items if isinstance(item, Figure)]
+    counted = Counter((figure.blur, _rounding(figure)) for figure in figures if _rounding(figure))
+    return {blur: rounding for (blur, rounding), _ in reversed(counted.most_common())}
+
+
+def _polygon(corners: Points) -> Contour:
+    first, *rest = pairs(corners)
+    return Contour(first, tuple((corner,) for corner in rest))
+
+
+def box_of(geometry: Geometry) -> Points:
+    """Width and height [2] of a geometry in its own frame, without a polygon's rounding."""
+    if isinstance(geometry, EllipseOutline):
+        return 2.0 * np.array(geometry.radii)
+    if isinstance(geometry, RectangleOutline):
+        return 2.0 * np.array(geometry.half_size)
+    if isinstance(geometry, PolygonOutline):
+        return np.asarray(np.ptp(np.array(geometry.points), axis=0))
+    points = [point for contour in geometry.contours for segment in contour.segments for point in segment]
+    return np.asarray(np.ptp(np.array(points), axis=0))
+
+
+def number(value: float, digits: int) -> str:
+    """A plain decimal number without needless zeros."""
+    text = f"{value:.{digits}f}"
+    if "." in text:
+        text = text.rstrip("0").rstrip(".")
+    if text in ("-0", ""):
+        return "0"
+    return text.replace("0.", ".", 1) if text.startswith(("0.", "-0.")) else text
+
+
+def color_text(color: Color) -> str:
+    """A colour as hexadecimal digits, the short form where it says the same."""
+    pairs = [f"{round(min(max(255.0 * channel, 0.0), 255.0)):02x}" for channel in color]
+    if all(pair[0] == pair[1] for pair in pairs):
+        pairs = [pair[0] for pair in pairs]
+    return "#" + "".join(pairs)
+
+
+def opacity_text(opacity: float) -> str | None:
+    """An opacity, None for the default."""
+    return None if opacity >= 0.9995 else number(opacity, 3)
+
+
+def _letters(index: int) -> str:
+    """A short name for each whole number: a, b, … z, ba, bb, …"""
+    rest, last = divmod(index, 26)
+    return (_letters(rest) if rest else "") + chr(ord("a") + last)
+
+
+def _lean(root: ElementTree.Element) -> str:
+    """The document as text, an element a line, without what nobody needs."""
+    for name in NEEDLESS:
+        root.attrib.pop(name, None)
+    for parent in (root, *root.iter("defs")):
+        parent.text = "\n"
+        for child in parent:
+            child.tail = "\n"
+    text = ElementTree.tostring(root, encoding="unicode").replace(" />", "/>")
+    return re.sub(r"<style[^>]*><!\[CDATA\[(.*?)\]\]></style>", r"<style>\1</style>", text)
