@@ -25,8 +25,8 @@ class Ramp(NamedTuple):
 @dataclass(frozen=True)
 class Paint:
     """`color(q, color, *own)` is the colour (vec3) at a point q of the shape's frame, in which the shape reaches from
-    about −1 to 1 along both axes. `own` are the parameters after `color`. `ramp(color, *own)` is for vector formats: of a
-    linear gradient whose middle is the frame's its slope along the frame's axes, its first and its last colour.
+    about −1 to 1 along both axes. `own` are the parameters after `color`. `ramp(color, *own)` is for vector formats: a
+    linear gradient whose middle is that of the frame.
     """
 
     name: str

@@ -41,7 +41,7 @@ def _painted(scene: Scene) -> Scene:
     tensors = from_scene(scene)
     image = draw(scene, width, height).flatten(1)
     x, y, pixel = canvas(tensors, width, height)
-    covers, _ = layers_at(tensors, x, y, pixel)
+    covers = layers_at(tensors, x, y, pixel)[0].clamp_min(0.0)
     light = covers @ image[:3].T / (covers @ image[3])[:, None].clamp_min(1e-6)
     colors = light.clamp(0.0, 1.0).tolist()
     order = (-covers.sum(1)).argsort(stable=True).tolist()

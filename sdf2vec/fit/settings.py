@@ -171,8 +171,10 @@ def _color(part: str | Color) -> Color:
 
 
 def kinds_of(kind: str | Sequence[str]) -> tuple[str, ...]:
-    """Names of kinds from a text like "box,circle", from several names, or "mixed" for all with an edge. Raises Sdf2vecError for an
-    unknown one."""
+    """Names of kinds from a text like "box,circle", from several names, or "mixed" for all with an edge.
+
+    Raises Sdf2vecError for an unknown one.
+    """
     names = [part.strip() for text in _listed("kind", kind) for part in str(text).split(",") if part.strip()]
     for name in names:
         check_choice("kind", name, (*KINDS, MIXED))
