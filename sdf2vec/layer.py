@@ -19,14 +19,12 @@ from typing import NamedTuple
 from .blend import COMPOSITING, JOINS, coverage, reach, saturation, union_reach
 from .expr import (
     VEC2,
-    VECTOR,
     Expr,
     Operand,
     const,
     let,
     maximum,
     minimum,
-    operation,
     scalarize,
     var,
     vec3,
@@ -112,14 +110,10 @@ def variable_row(structure: Structure) -> Row:
 def constant_row(structure: Structure, numbers: Sequence[float]) -> Row:
     """The numbers of one layer as constants."""
     rest = iter(numbers)
-    return Row(
-        {slot: _constant([next(rest) for _ in range(slot.parameter.width)]) for slot in slots(structure)}
-    )
-
-
-def _constant(values: Sequence[float]) -> Expr:
-    exprs = [const(value) for value in values]
-    return exprs[0] if len(exprs) == 1 else operation(VECTOR[len(exprs)].value, *exprs)
+    values = {}
+    for slot in slots(structure):
+        values[slot] = slot.parameter.constant([next(rest) for _ in range(slot.parameter.width)])
+    return Row(values)
 
 
 @dataclass(frozen=True)

@@ -184,7 +184,7 @@ class Joint(NamedTuple):
 class Layer:
     """A sequence of shapes joined left to right by smooth union, subtraction or intersection.
 
-    `falloff` is a length in scene units, without meaning for a patch. `opacity` is 0..1; in an additive scene it is
+    `falloff` is a length in scene units, 0 for a patch. `opacity` is 0..1; in an additive scene it is
     what the layer adds to alpha, −1..1. `joints` say how each shape but the first is joined, 0 being sharp.
     Raises SceneError.
     """
@@ -206,7 +206,8 @@ class Layer:
         patches = [shape.kind for shape in self.shapes if KINDS[shape.kind].patch is not None]
         if patches and self.joints:
             raise SceneError("shapes", f"a {patches[0]} can't be joined with others")
-        object.__setattr__(self, "falloff", _between(self.falloff, "falloff", 0.0, LONGEST_CANVAS))
+        falloff = _between(self.falloff, "falloff", 0.0, LONGEST_CANVAS)
+        object.__setattr__(self, "falloff", 0.0 if patches else falloff)
         object.__setattr__(self, "opacity", _between(self.opacity, "opacity", -1.0, 1.0, COLOR_DECIMALS))
         joints = tuple(_numbered(list(self.joints), "shapes", _joint, first=1))
         object.__setattr__(self, "joints", joints)
@@ -423,7 +424,7 @@ def save(scene: Scene, path: str | os.PathLike[str]) -> None:
 
 def _layer_object(layer: Layer) -> dict[str, Any]:
     rest: dict[str, Any] = {}
-    if layer.falloff or KINDS[layer.shapes[0].kind].patch is None:
+    if not layer.is_patch:
         rest["falloff"] = layer.falloff
     if layer.opacity != 1.0:
         rest["opacity"] = layer.opacity

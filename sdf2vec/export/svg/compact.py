@@ -113,7 +113,7 @@ def _polygon(outline: Outline, deviation: float, canvas: Canvas) -> PolygonOutli
 
 def figure(layer: Layer, blurred: Blurred, canvas: Canvas) -> Figure:
     """A layer as one figure in its mean colour."""
-    color = moved(np.mean([shape.color for shape in layer.shapes], axis=0).tolist(), 0.0)
+    color = moved(np.mean(layer.colors, axis=0).tolist(), 0.0)
     geometry = _whole(placed(blurred.outline, canvas))
     return Figure(geometry, color, layer.opacity, blurred.deviation * canvas.unit)
 

@@ -14,15 +14,16 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ...scene import Color
+from ...scene import Color, Layer
 from ...shapes import EllipseOutline, PolygonOutline
 from .canvas import Canvas, Points, pairs
 from .display import Figure, Fill, Group, LinearGradient, RadialGradient, Stop, moved
 from .gradient_stops import edge_stops
 from .outlines import convex, sides
-from .sampling import edge_range
+from .sampling import cover_at, edge_range, extent, frame_of
 
 LIFT = -0.3  # 8-bit levels: resvg and Firefox gain half a level at a gradient, the others nothing
+RADIAL_STOPS = 24  # of a patch
 WIDEST = math.radians(60.0)  # of a circular sector drawn as a triangle
 
 
@@ -51,6 +52,26 @@ def ellipse(outline: EllipseOutline, edge: SoftEdge, canvas: Canvas) -> Figure:
     stops = edge.stops(shortest, shortest + edge_range()[1])
     gradient = RadialGradient(center, radii, stops, outline.angle)
     return Figure(EllipseOutline(center, radii, outline.angle), gradient, edge.opacity)
+
+
+def radial(layer: Layer, color: Color, canvas: Canvas) -> Figure:
+    """A patch whose coverage falls with the distance from the middle of its frame, as far as it reaches."""
+    frame, box = frame_of(layer.shapes[0]), extent(layer)
+    half = np.maximum(frame.half, 1.0 / canvas.unit)
+    reach = max(box.right - box.left, box.bottom - box.top) / 2 / float(half.max())
+    offsets = np.linspace(0.0, 1.0, RADIAL_STOPS)
+    places = frame.origin + np.outer(offsets * reach * half[0], frame.axis)
+    found = cover_at(layer, places, 1.0 / canvas.unit)
+    stops = tuple(
+        Stop(o, moved(color, LIFT), c) for o, c in zip(offsets.tolist(), found.tolist(), strict=True)
+    )
+    angle = math.atan2(frame.axis[1], frame.axis[0])
+    center, (across, down) = canvas.place(frame.origin), (half * reach * canvas.unit).tolist()
+    return Figure(
+        EllipseOutline(center, (across, down), angle),
+        RadialGradient(center, (across, down), stops, angle),
+        layer.opacity,
+    )
 
 
 def sliced(points: Points, rounding: float, edge: SoftEdge, canvas: Canvas) -> Group:

@@ -8,18 +8,28 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ...scene import Color, Layer, Scene
-from ...shapes import EllipseOutline
+from ...shapes import KINDS, EllipseOutline
 from .bezier_fit import smooth_path, straight_path
 from .blur import Blurred
 from .canvas import Canvas
 from .compact import figure
 from .display import Drawing, Figure, Group, Item, LinearGradient
-from .gradients import SoftEdge, ellipse, sliced
-from .isobands import Band, band_count, band_edges, edge_distance, layer_contours, stacked
+from .gradients import SoftEdge, ellipse, radial, sliced
+from .isobands import (
+    Band,
+    band_count,
+    band_edges,
+    edge_distance,
+    isobands,
+    layer_contours,
+    stacked,
+    trace_grid,
+)
 from .outlines import TOLERANCE, core, edge_of, placed, upright
 from .plan import Detail, Plan
 from .refit_appearance import refitted
-from .union_gradient import fill_of
+from .sampling import covers
+from .union_gradient import fill_of, mean_color, ramp_of
 from .union_partition import part_bands
 
 TRANSPARENT_LIFT = 0.5  # 8-bit levels: on no ground browsers lose half of one at a blur
@@ -56,6 +66,8 @@ class Painter:
 
     def _drawn(self, layer: Layer, index: int) -> Item | None:
         canvas, blurred = self.plan.canvas, self.plan.blurred.get(index)
+        if layer.is_patch:
+            return self._patch(layer, index)
         lift = self.lift if blurred is not None and blurred.deviation else 0.0
         fill, error = fill_of(layer, canvas, lift)
         if error > MIXED * self.detail.levels:
@@ -92,11 +104,24 @@ class Painter:
 
     def _parts(self, layer: Layer, bands: int) -> Item | None:
         """A union of several colours, shape by shape."""
-        spread = float(np.var([shape.color for shape in layer.shapes], axis=0).mean()) * layer.opacity**2
+        spread = float(np.var(layer.colors, axis=0).mean()) * layer.opacity**2
         count = max(bands // 2, band_count(spread, PARTS_COARSER * self.detail.levels))
         found = part_bands(layer, count, self.plan.canvas)
-        fills: list[Color | LinearGradient] = [shape.color for shape in layer.shapes]
+        fills = [ramp_of(shape, self.plan.canvas) or mean_color(shape) for shape in layer.seen]
         return self._stacked(layer, list(zip(fills, found, strict=True)), 2.0 * TOLERANCE)
+
+    def _patch(self, layer: Layer, index: int) -> Item | None:
+        """Coverage of its own: by one gradient where it is radial, else traced."""
+        canvas, (fill, _) = self.plan.canvas, fill_of(layer, self.plan.canvas)
+        patch = KINDS[layer.shapes[0].kind].patch
+        if patch is not None and patch.radial and not isinstance(fill, LinearGradient):
+            return radial(layer, fill, canvas)
+        grid = trace_grid(layer, canvas)
+        if grid is None:
+            return None
+        levels = [-edge for edge in band_edges(self.plan.bands[index])]
+        bands = isobands(-covers(layer, grid, 1.0 / canvas.unit), levels, grid, canvas)
+        return self._stacked(layer, [(fill, bands)], TOLERANCE)
 
     def _stacked(
         self, layer: Layer, parts: Sequence[tuple[Color | LinearGradient, list[Band]]], least: float
@@ -104,7 +129,7 @@ class Painter:
         """Bands of one or several fills in a group; their contours may be off by `least` user units at least."""
         canvas = self.plan.canvas
         falloff = layer.falloff * canvas.unit
-        wide = self.plan.rings and falloff * canvas.pixels > NARROW
+        wide = self.plan.rings and (falloff * canvas.pixels > NARROW or layer.is_patch)
         apart = wide and len(parts) == 1  # no two paths overlap: each can have the layer's opacity itself
         tolerance = min(max(least, 0.15 * falloff / max(1, len(parts[0][1]))), LOOSEST)
         path = straight_path if wide else smooth_path

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
@@ -71,7 +72,8 @@ class Plan:
 
     def is_rounded_down(self, index: int, layer: Layer) -> bool:
         """Whether a layer is drawn by what 8 bits take from most: a blur, or bands."""
-        return index in self.blurred or (self.soft[index] and edge_of(layer, 0.0) is None)
+        banded = (self.soft[index] or layer.is_patch) and edge_of(layer, 0.0) is None
+        return index in self.blurred or banded
 
 
 @dataclass
@@ -104,8 +106,10 @@ class Planner:
     @cached_property
     def traced(self) -> dict[int, Blurred]:
         """The nearest contour of each sharp layer that has no outline of its own."""
-        sharp = (index for index, soft in enumerate(self.soft) if not soft)
-        return self._blurs([index for index in sharp if edge_of(self.scene.layers[index], 0.5) is None])
+        sharp = (
+            (i, layer) for i, layer in enumerate(self.scene.layers) if not (self.soft[i] or layer.is_patch)
+        )
+        return self._blurs([index for index, layer in sharp if edge_of(layer, 0.5) is None])
 
     def _blurs(self, indices: Sequence[int]) -> dict[int, Blurred]:
         tried = {index: best_blur(self.scene.layers[index], self.canvas) for index in indices}
@@ -114,7 +118,8 @@ class Planner:
     @property
     def details(self) -> list[Detail]:
         """The details that a drawing may have, finest first."""
-        compact = self.filters or not any(self.soft)
+        patches = any(layer.is_patch for layer in self.scene.layers)
+        compact = (self.filters or not any(self.soft)) and not patches
         return [detail for detail in DETAILS if compact or not detail.grain]
 
     def plan(self, detail: Detail) -> Plan:
@@ -123,7 +128,9 @@ class Planner:
         stops = [stop_count(weight, detail.levels) for weight in self.weights.tolist()]
         side = max(self.canvas.unit, SHOWN)
         bands = [
-            band_count(weight, BANDS_COARSER * detail.levels, layer.falloff * side)
+            band_count(
+                weight, BANDS_COARSER * detail.levels, math.inf if layer.is_patch else layer.falloff * side
+            )
             for weight, layer in zip(self.weights.tolist(), scene.layers, strict=True)
         ]
         if grain:

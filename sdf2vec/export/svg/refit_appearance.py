@@ -195,7 +195,7 @@ def _stack(
     covers, colors, width, height = samples
     ground = None if scene.background is None else np.array(scene.background)
     opacities = np.array([layer.opacity for layer in scene.layers])
-    plain = np.array([len({shape.color for shape in layer.shapes}) == 1 for layer in scene.layers])
+    plain = np.array([len(set(layer.colors)) == 1 for layer in scene.layers])
     exact = Stack(covers.astype(np.float32), colors, opacities, ground, plain, (colors, opacities))
     x = (np.arange(width) + 0.5 - width / 2) / min(width, height)
     y = (np.arange(height) + 0.5 - height / 2) / min(width, height)

@@ -129,6 +129,13 @@ def covers(layer: Layer, grid: SampleGrid, pixel: float) -> Array:
     return np.asarray(_evaluate(layer, grid, pixel, 2)[1])
 
 
+def cover_at(layer: Layer, places: Array, pixel: float) -> Array:
+    """Coverage [N] of a layer at points [N, 2], for pixels of a size in scene units."""
+    flat = [torch.tensor(value, dtype=torch.float64) for value in (pixel, *layer.numbers)]
+    x, y = torch.from_numpy(np.ascontiguousarray(places)).T
+    return np.asarray(_formula(layer.structure, 2)(x, y, *flat)[1].numpy())
+
+
 def colors(layer: Layer, grid: SampleGrid) -> Array:
     """The colour [3, Y, X] of a layer, which varies in a smooth union."""
     return _evaluate(layer, grid, 0.0, 5)[2:]

@@ -6,15 +6,17 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ...scene import Color, Layer
+from ...paints import PAINTS
+from ...scene import Color, Layer, Shape
 from .canvas import Canvas, pairs
 from .display import LinearGradient, Stop, moved
 from .isobands import seen
-from .sampling import Array, colors, covers, grid_over
+from .sampling import Array, colors, covers, frame_of, grid_over
 
 STOPS = 7
 CELLS = 48  # of the grid along the longest side
 SAME = 0.5 / 255.0
+FLAT = 1e-9
 
 
 class LayerFill(NamedTuple):
@@ -25,14 +27,16 @@ class LayerFill(NamedTuple):
 
 
 def fill_of(layer: Layer, canvas: Canvas, lift: float = 0.0) -> LayerFill:
-    """The mean colour, or for several a gradient along the direction in which they change most.
+    """One colour, the gradient of a paint, or for several shapes one along the direction in which they change most.
 
     `lift`: 8-bit levels that colours are raised by.
     """
-    own = np.array([shape.color for shape in layer.shapes])
+    own = np.array(layer.colors)
     flat = LayerFill(moved(own.mean(axis=0).tolist(), lift))
     if np.ptp(own, axis=0).max() <= SAME:
         return flat
+    if len(layer.seen) == 1 and (ramp := ramp_of(layer.seen[0], canvas, lift)) is not None:
+        return LayerFill(ramp)
     box = seen(layer, canvas)
     if box.empty:
         return flat
@@ -45,6 +49,30 @@ def fill_of(layer: Layer, canvas: Canvas, lift: float = 0.0) -> LayerFill:
     start, end = pairs(canvas.places(knots[[0, -1]]))
     stops = tuple(Stop(i / (STOPS - 1), moved(value, lift)) for i, value in enumerate(values.tolist()))
     return LayerFill(LinearGradient(start, end, stops), 255.0 * off * max(layer.opacity, 1e-3))
+
+
+def ramp_of(shape: Shape, canvas: Canvas, lift: float = 0.0) -> LinearGradient | None:
+    """A paint that is a linear gradient as one; None for any other, and where the gradient is next to none."""
+    ramp_from, frame = PAINTS[shape.paint].ramp, frame_of(shape)
+    if ramp_from is None:
+        return None
+    ramp = ramp_from(*shape.painted().values())
+    (cosine, sine), (across, down) = frame.axis, np.array(ramp.slope) / np.maximum(frame.half, FLAT)
+    slope = np.array(
+        [across * cosine - down * sine, across * sine + down * cosine]
+    )  # along x and y of the scene
+    steepness = float(slope @ slope)
+    if steepness < FLAT:
+        return None
+    ends = frame.origin + np.outer((-0.5, 0.5), slope / steepness)
+    start, end = pairs(canvas.places(ends))
+    return LinearGradient(start, end, (Stop(0.0, moved(ramp.first, lift)), Stop(1.0, moved(ramp.last, lift))))
+
+
+def mean_color(shape: Shape) -> Color:
+    """The mean of a shape's colours."""
+    red, green, blue = np.mean(shape.colors, axis=0).tolist()
+    return red, green, blue
 
 
 def nearest_gradient(places: Array, wanted: Array, weight: Array) -> tuple[Array, Array, float]:

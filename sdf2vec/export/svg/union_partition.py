@@ -10,7 +10,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from ...scene import Layer
+from ...scene import Layer, Shape
 from .canvas import Canvas
 from .isobands import Band, band_edges, isobands, trace_grid
 from .sampling import Array, SampleGrid, colors, covers
@@ -19,16 +19,16 @@ LEAST = 1e-6
 
 
 def part_bands(layer: Layer, count: int, canvas: Canvas) -> list[list[Band]]:
-    """The bands of each shape's part, lowest first."""
+    """The bands of each seen shape's part, lowest first."""
     grid = trace_grid(layer, canvas)
     if grid is None:
-        return [[] for _ in layer.shapes]
+        return [[] for _ in layer.seen]
     levels = [-edge for edge in band_edges(count)]
     return [isobands(-alpha, levels, grid, canvas) for alpha in alphas(layer, grid, 1.0 / canvas.unit)]
 
 
 def alphas(layer: Layer, grid: SampleGrid, pixel: float) -> list[Array]:
-    """The alpha [Y, X] of each shape's part, lowest first."""
+    """The alpha [Y, X] of each seen shape's part, lowest first."""
     cover = covers(layer, grid, pixel)
     found, above = [], np.zeros_like(cover)
     for share in reversed(shares(layer, grid)):
@@ -39,12 +39,13 @@ def alphas(layer: Layer, grid: SampleGrid, pixel: float) -> list[Array]:
 
 
 def shares(layer: Layer, grid: SampleGrid) -> list[Array]:
-    """How much of each shape's colour the union has at each point [Y, X]; they add up to 1."""
+    """How much of each seen shape's colour the layer has at each point [Y, X]; they add up to 1."""
     found: list[Array] = []
-    for first in range(0, len(layer.shapes), 3):  # three at a time, as red, green and blue
-        marked = [
-            replace(shape, color=(float(i == first), float(i == first + 1), float(i == first + 2)))
-            for i, shape in enumerate(layer.shapes)
-        ]
-        found += list(colors(replace(layer, shapes=tuple(marked)), grid))[: len(layer.shapes) - first]
+    places = [index for index, part in enumerate(layer.structure) if part.adds]
+    for first in range(0, len(places), 3):  # three at a time, as red, green and blue
+        marked = list(layer.shapes)
+        for i, place in enumerate(places):
+            mark = (float(i == first), float(i == first + 1), float(i == first + 2))
+            marked[place] = Shape(marked[place].kind, marked[place].parameters, mark)
+        found += list(colors(replace(layer, shapes=tuple(marked)), grid))[: len(places) - first]
     return found
