@@ -25,8 +25,8 @@ FADE = (Stop(0.0, RED), Stop(1.0, RED, 0.0))
 DISC = EllipseOutline((20.0, 30.0), (10.0, 10.0))
 
 
-def text_of(*items, style=Style(), digits=1):
-    return written(Drawing(100, 50, 2.0, digits, None, items), "a <title>", style)
+def text_of(*items, style=None, digits=1):
+    return written(Drawing(100, 50, 2.0, digits, None, items), "a <title>", style or Style())
 
 
 def parsed(*items, **options):
@@ -42,7 +42,7 @@ def test_the_whole_document():
     text = text_of(plain)
     name = re.findall(r'id="(s[0-9a-f]{5})box-1"', text)[0]
     assert text == (
-        '<svg xmlns="http://www.w3.org/2000/svg" height="100" role="img" viewBox="0 0 100 50" width="200">\n'
+        '<svg height="100" role="img" viewBox="0 0 100 50" width="200" xmlns="http://www.w3.org/2000/svg">\n'
         "<title>a &lt;title&gt;</title>\n"
         f'<rect fill="#00f" height="10" id="{name}box-1" width="20" x="40" y="20"/>\n</svg>\n'
     )
