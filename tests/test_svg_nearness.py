@@ -18,9 +18,12 @@ from sdf2vec.export.svg import smallest
 from sdf2vec.export.svg import svg as write_svg
 from sdf2vec.export.svg.blur import STEPS, trial_of
 from sdf2vec.export.svg.canvas import Canvas
-from sdf2vec.export.svg.outlines import element
-from sdf2vec.export.svg.refit_appearance import Difference, compensated
-from sdf2vec.export.svg.sampling import Grid, covers, distances, extent, grid_over
+from sdf2vec.export.svg.display import Drawing, Figure
+from sdf2vec.export.svg.outlines import placed
+from sdf2vec.export.svg.refit_appearance import Difference, refitted
+from sdf2vec.export.svg.sampling import SampleGrid, covers, distances, extent, grid_over
+from sdf2vec.export.svg.visibility import layers_at
+from sdf2vec.export.svg.writer import Style, written
 from sdf2vec.image import premultiply
 from sdf2vec.render.reference import render
 from sdf2vec.shapes import PolygonOutline
@@ -32,10 +35,18 @@ NAMESPACE = "{http://www.w3.org/2000/svg}"
 BLURRING = ["resvg", "librsvg", "chromium", "firefox"]
 
 
+def text_of(scene, **options):
+    return write_svg(scene, Options(**options)).data
+
+
+def refitted_at(scene, *arguments):
+    return refitted(scene, layers_at(scene), *arguments)
+
+
 def off_in(engine, scene, size=None, **options):
     """Drawn minus rendered, premultiplied [H, W, 4], 0..1."""
     width, height = size or (scene.width, scene.height)
-    text = write_svg(scene, Options(**options))
+    text = text_of(scene, **options)
     drawn = premultiply(ENGINES[engine].render(text, width, height))
     return drawn - render(scene, width, height, dtype=torch.float64).permute(1, 2, 0).numpy()
 
@@ -56,7 +67,7 @@ def test_an_opacity_makes_up_for_coverage_that_is_too_little():
     scene = Scene(120, 80, (disc(),), None)
     grid = grid_over(extent(scene.layers[0]), 0.004)
     missing = {0: Difference(grid, -0.1 * covers(scene.layers[0], grid, 1 / 80))}
-    (layer,) = compensated(scene, missing).layers
+    (layer,) = refitted_at(scene, missing).layers
     assert layer.opacity == pytest.approx(0.5 / 0.9, abs=2e-3)
     assert layer.shapes[0].color == pytest.approx((0.2, 0.4, 0.6), abs=2e-3)
 
@@ -65,7 +76,7 @@ def test_an_opacity_makes_up_for_coverage_that_is_too_little():
 def test_a_difference_in_few_numbers(shape):
     """A straight slope keeps its values at the places that are kept, however thin the grid is."""
     rows, columns = shape
-    grid = Grid(np.arange(columns) * 0.5 + 3.0, np.arange(rows) * 0.5 - 1.0, 0.5)
+    grid = SampleGrid(np.arange(columns) * 0.5 + 3.0, np.arange(rows) * 0.5 - 1.0, 0.5)
     slope = grid.x[None, :] + 2.0 * grid.y[:, None]
     kept, off = Difference(grid, slope).coarse()
     assert off.shape == (len(kept.y), len(kept.x))
@@ -78,10 +89,10 @@ def test_a_difference_in_few_numbers(shape):
 
 def test_what_is_drawn_exactly_stays():
     scene = Scene(120, 80, (disc(), disc(0.3)), (0.1, 0.2, 0.3))
-    assert compensated(scene, {}) == scene
+    assert refitted_at(scene, {}) == scene
     grid = grid_over(extent(scene.layers[0]), 0.01)
     nothing = Difference(grid, np.zeros((len(grid.y), len(grid.x))))
-    for before, after in zip(scene.layers, compensated(scene, {0: nothing, 1: nothing}).layers, strict=True):
+    for before, after in zip(scene.layers, refitted_at(scene, {0: nothing, 1: nothing}).layers, strict=True):
         assert after.opacity == pytest.approx(before.opacity, abs=1e-4)
         assert after.shapes[0].color == pytest.approx(before.shapes[0].color, abs=1e-4)
 
@@ -90,7 +101,7 @@ def test_an_opacity_makes_up_for_what_8_bits_cut_off():
     """A tenth of 255 is 25.5 levels, of which 25 are left: it has to be 2 % more."""
     whole = Shape.of("circle", (0.2, 0.4, 0.6), center=(0, 0), radius=3.0)
     scene = Scene(120, 80, (Layer((whole,), 0.0, 0.1),), None)
-    (layer,) = compensated(scene, {}, cut=[0]).layers
+    (layer,) = refitted_at(scene, {}, [0]).layers
     assert layer.opacity == pytest.approx(0.1 * 25.5 / 25, abs=1e-5)
 
 
@@ -125,7 +136,7 @@ def test_colours_in_steps_make_up_for_each_other():
         place = (r.uniform(-0.6, 0.6), r.uniform(-0.4, 0.4))
         layers.append(Layer((Shape.of("circle", color, center=place, radius=r.uniform(0.1, 0.3)),), 0.1, 0.5))
     scene = Scene(120, 80, tuple(layers), (0.5, 0.5, 0.5))
-    chosen = compensated(scene, {}, (), 15, 10)
+    chosen = refitted_at(scene, {}, (), 15, 10)
     steps = np.array([layer.shapes[0].color for layer in chosen.layers]) * 15
     assert np.allclose(steps, np.round(steps), atol=1e-3)
     nearest = replace(scene, layers=tuple(in_steps(layer, 15) for layer in scene.layers))
@@ -143,7 +154,7 @@ def test_grey_stays_grey():
         color = (grey, grey + r.uniform(0, 1.8e-3), grey + r.uniform(0, 1.8e-3))
         shape = Shape.of("circle", color, center=place, radius=r.uniform(0.1, 0.3))
         layers.append(Layer((shape,), 0.1, r.uniform(0.2, 1.0)))
-    chosen = compensated(Scene(120, 80, tuple(layers), (0.5, 0.5, 0.5)), {}, (), 15, 10)
+    chosen = refitted_at(Scene(120, 80, tuple(layers), (0.5, 0.5, 0.5)), {}, (), 15, 10)
     assert all(len(set(layer.shapes[0].color)) == 1 for layer in chosen.layers)
 
 
@@ -166,7 +177,7 @@ def test_many_soft_edges_on_each_other(engine, require_engine):
         )
         layers.append(Layer((box,), r.uniform(0.05, 0.12), r.uniform(0.5, 1.0)))
     scene = Scene(240, 240, tuple(layers), None)
-    assert "feGaussianBlur" in write_svg(scene, Options())
+    assert "feGaussianBlur" in text_of(scene)
     for size in (None, (480, 480), (360, 250)):
         off = off_in(engine, scene, size)
         assert decibels(off) >= {"resvg": 45, "librsvg": 43.5}.get(engine, 42)  # 3 less without compensation
@@ -205,7 +216,7 @@ def test_turned_boxes_are_blurred_alike_in_all_directions(engine, require_engine
     numbers: Numbers = {"center": (0, 0), "half_size": (0.3, 0.1), "angle": 0.8, "corner_radius": 0.0}
     box = Layer((Shape.of("box", (0.3, 0.3, 0.3), **numbers),), 0.15)
     scene = Scene(300, 200, (box,), (0.2, 0.2, 0.2))
-    text = write_svg(scene, Options())
+    text = text_of(scene)
     assert "feGaussianBlur" in text
     assert 255 * np.abs(off_in(engine, scene)).max() <= 3
 
@@ -216,7 +227,9 @@ def test_half_circles_are_whole():
     canvas = Canvas.of(Scene(512, 512, (), None))
     for _ in range(100):
         ends = tuple((r.uniform(-0.5, 0.5), r.uniform(-0.5, 0.5)) for _ in range(2))
-        path = ElementTree.fromstring(element(PolygonOutline(ends, r.uniform(0.01, 0.2)), canvas))
+        outline = placed(PolygonOutline(ends, r.uniform(0.01, 0.2)), canvas)
+        drawing = Drawing(512, 512, 1, canvas.digits, None, (Figure(outline, (0, 0, 0)),))
+        path = ElementTree.fromstring(written(drawing, "", Style()))[-1]
         move, *arcs = re.findall(r"[A-Z][^A-Z]*", path.get("d", ""))
         corners = [
             [float(v) for v in command[1:].split()][-2:] for command in (move, *arcs) if command != "Z"
@@ -235,7 +248,7 @@ def test_a_traced_blur(engine, require_engine):
     numbers: Numbers = {"center": (0, 0), "radius": 0.28, "amplitude": 0.03, "frequency": (9, 8)}
     layer = Layer((Shape.of("displaced", (0.5, 0.4, 0.3), **numbers),), 0.12, 0.7)
     scene = Scene(300, 220, (layer,), (0.4, 0.4, 0.4))
-    root = ElementTree.fromstring(write_svg(scene, Options()))
+    root = ElementTree.fromstring(text_of(scene))
     (path,) = root.findall(f"{NAMESPACE}path")
     assert path.get("filter")
     for size in ((300, 220), (600, 440), (405, 297)):
@@ -248,7 +261,7 @@ def test_a_traced_contour_moves_to_where_its_blur_is_one_half():
     """Where an outline bends, its blur lies inside of it."""
     numbers: Numbers = {"center": (0, 0), "radius": 0.1, "amplitude": 0.03, "frequency": (9, 8)}
     layer = Layer((Shape.of("displaced", (1, 1, 1), **numbers),), 0.15)
-    trial = trial_of(layer, (300, 220, 220.0), 128, 128)
+    trial = trial_of(layer, Canvas.of(Scene(300, 220, (layer,), None)), 128, 128)
     still, *moved = trial.moved(distances(layer, trial.grid) - 0.075, 1.0)
     assert moved[-1].error < 0.7 * still.error
 
@@ -265,7 +278,7 @@ def test_bands_leave_no_gaps(engine, profile, require_engine):
     numbers: Numbers = {"center": (0.4, 0), "radius": 0.3, "amplitude": 0.1, "frequency": (12, 9)}
     layer = Layer((Shape.of("displaced", (1, 1, 1), **numbers),), 0.4, 0.8)
     scene = Scene(150, 100, (layer,), (0, 0, 0))
-    assert ("crispEdges" in write_svg(scene, Options(svg_profile=profile))) == (profile == "filters")
+    assert ("crispEdges" in text_of(scene, svg_profile=profile)) == (profile == "filters")
     for size in ((150, 100), (300, 200), (450, 300), (615, 410)):
         off = off_in(engine, scene, size, svg_profile=profile)
         wrong = np.count_nonzero(255 * np.abs(off).max(axis=2) > 16)
@@ -303,7 +316,7 @@ def test_the_smallest_drawing_says_a_triangle_in_few_bytes():
             Layer((Shape.of("triangle", color, **corners),), r.uniform(0.01, 0.2), r.uniform(0.4, 1.0))
         )
     scene = Scene(256, 256, tuple(layers), (0.5, 0.5, 0.5))
-    text = write_svg(scene, Options(svg_size_limit=22000))
+    text = text_of(scene, svg_size_limit=22000)
     root = ElementTree.fromstring(text)
     assert root.get("viewBox") == "0 0 160 160"
     assert root.get("width") == "256"
@@ -328,7 +341,7 @@ def test_a_tighter_limit_takes_no_more_from_the_picture_than_it_must(softest, re
     scene = Scene(240, 180, layers, (0.5, 0.5, 0.5))
     wanted = render(scene, 480, 360).permute(1, 2, 0).numpy()
     least = smallest(scene, Options())
-    texts = [write_svg(scene, Options())]
+    texts = [text_of(scene)]
     while texts[-1] != least:
         texts.append(write_svg(scene, Options(svg_size_limit=len(texts[-1].encode()) - 1)))
     found = [-10 * np.log10(np.mean((ENGINES["resvg"].render(t, 480, 360) - wanted) ** 2)) for t in texts]
