@@ -17,7 +17,7 @@ import numpy as np
 import svgwrite
 
 from ...scene import Color
-from ...shapes import EllipseOutline, PolygonOutline, RectangleOutline
+from ...shapes import EllipseOutline, Point, PolygonOutline, RectangleOutline
 from .canvas import Points, pairs
 from .display import (
     Contour,
@@ -151,9 +151,21 @@ class _Writer:
 
     @paint.register
     def _(self, fill: LinearGradient, figure: Figure) -> str:
-        start, end = ((self.fine(x), self.fine(y)) for x, y in (fill.start, fill.end))
+        ends = (self._within_element(point, figure.geometry) for point in (fill.start, fill.end))
+        start, end = ((self.fine(x), self.fine(y)) for x, y in ends)
         made = self.svg.linearGradient(start, end, gradientUnits="userSpaceOnUse")
         return self._gradient(made, fill.stops)
+
+    def _within_element(self, point: Point, geometry: Geometry) -> Point:
+        """A point in the coordinates of the element that a geometry becomes: a turned one has its own."""
+        round_ = isinstance(geometry, EllipseOutline) and len({*map(self.number, geometry.radii)}) == 1
+        if not isinstance(geometry, EllipseOutline | RectangleOutline) or round_:
+            return point
+        angle = geometry.angle % math.pi
+        x, y = (a - b for a, b in zip(point, geometry.center, strict=True))
+        x, y = x * math.cos(angle) + y * math.sin(angle), y * math.cos(angle) - x * math.sin(angle)
+        left, top = (0.0, 0.0) if isinstance(geometry, EllipseOutline) else geometry.center
+        return x + left, y + top
 
     @paint.register
     def _(self, fill: RadialGradient, figure: Figure) -> str:
