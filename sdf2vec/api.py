@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Sequence
 from typing import TYPE_CHECKING, Any
 
+from .arrays import Float32Array
 from .declared import checked, documented
 from .deferred import deferred
 from .export.exported import Exported
@@ -14,16 +15,13 @@ from .fit.settings import Settings, settings_of
 from .scene import Scene
 
 if TYPE_CHECKING:
-    import numpy as np
-    from numpy.typing import NDArray
-
     from .fit.loop import Progress
     from .image import Picture
     from .roundtrip import Check, Size
 
 _load_picture: Callable[[Any], Picture] = deferred("sdf2vec.image", "load")
 _fit_picture: Callable[..., Scene] = deferred("sdf2vec.fit.loop", "fit_picture")
-_render: Callable[..., NDArray[np.float32]] = deferred("sdf2vec.render.draw", "pixels_of")
+_render: Callable[..., Float32Array] = deferred("sdf2vec.render.draw", "pixels_of")
 _check: Callable[..., list[Check]] = deferred("sdf2vec.roundtrip", "check")
 
 
@@ -46,7 +44,7 @@ def fit(
     return _fit_picture(_load_picture(image), settings, callback or (lambda progress: False))
 
 
-def render(scene: Scene, width: int | None = None, height: int | None = None) -> NDArray[np.float32]:
+def render(scene: Scene, width: int | None = None, height: int | None = None) -> Float32Array:
     """The scene as an array [height, width, 3], or [.., 4] with straight alpha when it is transparent; 0..1."""
     return _render(scene, width, height)
 

@@ -23,7 +23,7 @@ from PIL import Image, ImageChops, ImageCms, ImageOps
 from sdf2vec.errors import Sdf2vecError
 from sdf2vec.files import one_line
 
-Floats = NDArray[np.float32]
+from .arrays import Float32Array
 
 MAX_PIXELS = 200_000_000
 """Pictures with more pixels than this are refused before they are decoded."""
@@ -44,7 +44,7 @@ _CHANNELS = {1: [0, 0, 0], 2: [0, 0, 0, 1], 3: [0, 1, 2], 4: [0, 1, 2, 3]}  # gr
 class Picture:
     """A picture ready to be fitted, with what a user should know about how it was read."""
 
-    pixels: Floats  # [H, W, 3] opaque or [H, W, 4] straight alpha; sRGB-coded, 0..1
+    pixels: Float32Array  # [H, W, 3] opaque or [H, W, 4] straight alpha; sRGB-coded, 0..1
     notes: tuple[str, ...] = ()
 
     @property
@@ -317,7 +317,7 @@ def _as_sixteen_bits(values: NDArray[Any], name: str) -> NDArray[np.uint16]:
     return values.astype(np.uint16)
 
 
-def _unit(values: NDArray[Any], name: str) -> Floats:
+def _unit(values: NDArray[Any], name: str) -> Float32Array:
     """A new array of the same shape, 0..1."""
     full_scale = _FULL_SCALE.get(values.dtype.name)
     if full_scale:
@@ -335,24 +335,24 @@ def _unit(values: NDArray[Any], name: str) -> Floats:
     return np.clip(unit, 0, 1, out=unit)
 
 
-def _without_opaque_alpha(pixels: Floats) -> Floats:
+def _without_opaque_alpha(pixels: Float32Array) -> Float32Array:
     opaque = pixels.shape[2] == 4 and pixels[..., 3].min() >= 1
     return np.ascontiguousarray(pixels[..., :3] if opaque else pixels)
 
 
-def premultiply(pixels: Floats) -> Floats:
+def premultiply(pixels: Float32Array) -> Float32Array:
     """Straight to premultiplied alpha: colour times alpha. [H, W, 4], a new array."""
     return np.concatenate([pixels[..., :3] * pixels[..., 3:], pixels[..., 3:]], axis=2)
 
 
-def unpremultiply(pixels: Floats) -> Floats:
+def unpremultiply(pixels: Float32Array) -> Float32Array:
     """Premultiplied to straight alpha: colour over alpha, black where alpha is 0. [H, W, 4], a new array."""
     alpha = pixels[..., 3:]
     colour = np.divide(pixels[..., :3], alpha, out=np.zeros_like(pixels[..., :3]), where=alpha > 0)
     return np.concatenate([colour, alpha], axis=2)
 
 
-def resize(pixels: Floats, width: int, height: int) -> Floats:
+def resize(pixels: Float32Array, width: int, height: int) -> Float32Array:
     """Resample [H, W, 3 or 4] (straight, 0..1) to [height, width, 3 or 4], clipped to 0..1.
 
     Both pictures cover the same rectangle and pixel centres are at half-integers, so nothing shifts.
@@ -369,7 +369,7 @@ def resize(pixels: Floats, width: int, height: int) -> Floats:
     return np.clip(unpremultiply(result), 0, 1) if has_alpha else result
 
 
-def _resized_plane(plane: Floats, width: int, height: int, method: Image.Resampling) -> Floats:
+def _resized_plane(plane: Float32Array, width: int, height: int, method: Image.Resampling) -> Float32Array:
     image = Image.fromarray(np.ascontiguousarray(plane, np.float32))  # [H, W], Pillow's mode F
     return np.asarray(image.resize((width, height), method))
 

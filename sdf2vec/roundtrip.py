@@ -12,8 +12,8 @@ from typing import Any
 
 import numpy as np
 import torch
-from numpy.typing import NDArray
 
+from .arrays import Float32Array
 from .engines import ENGINES
 from .errors import Sdf2vecError
 from .export.exported import Exported
@@ -25,7 +25,7 @@ from .render.draw import draw, draw_fast, is_large
 from .render.reference import render
 from .scene import Scene, dumps
 
-Pixels = NDArray[np.float32]  # [height, width, 4] premultiplied RGBA
+Pixels = Float32Array  # [height, width, 4] premultiplied RGBA
 Size = tuple[int, int]
 
 SAME = 0.25  # largest error, in 8-bit levels, of an export that is the same picture

@@ -19,6 +19,7 @@ import numpy as np
 import torch
 from numba import njit
 
+from ..blend import OVER
 from ..expr import Expr
 from ..files import write_atomically
 from ..fit.initialization import Layers, place
@@ -26,6 +27,7 @@ from ..fit.loop import adam
 from ..fit.losses import l1
 from ..fit.presets import Start
 from ..fit.ssim import Dissimilarity
+from ..layer import Formula, Part
 from ..lower.block import dependent, derivatives
 from ..metrics import ssim
 from ..render import fused, kernels, reference
@@ -106,7 +108,7 @@ def per_shape_pixel() -> Iterator[str]:
         tensors = scene([kind], 256, target)
         weights = torch.randn(3, 256, 256, generator=torch.Generator().manual_seed(0))
         for group in tensors.groups:
-            for _, tensor in group.tensors():
+            for tensor in group.values.values():
                 tensor.requires_grad_()
 
         def run(tensors: SceneTensors = tensors, weights: torch.Tensor = weights) -> None:
@@ -123,9 +125,8 @@ def per_shape_pixel() -> Iterator[str]:
 
 def covered_pixels(tensors: SceneTensors, side: int) -> int:
     """Pairs of a layer and a pixel with a coverage above 0."""
-    x, y, pixel = reference.canvas(tensors, side, side)
-    with torch.no_grad():
-        return sum(int((reference.group_coverage(g, x, y, pixel)[0] > 0).sum()) for g in tensors.groups)
+    cover, _ = reference.layers_at(tensors, *reference.canvas(tensors, side, side))
+    return int((cover != 0).sum())
 
 
 def pixels_in_extents(tensors: SceneTensors, side: int) -> float:
@@ -136,9 +137,9 @@ def pixels_in_extents(tensors: SceneTensors, side: int) -> float:
 
 def operations(kind: str) -> int:
     """Float operations per pixel of a step: the layer drawn twice, and its derivatives."""
-    block = kernels.Formula(kernels.LayerKind(kind, 1)).drawn("layer", "over", 3)
-    found = derivatives(block, kernels.flows_of(3))
-    inner = dependent((*found.sums, *found.flows), (*block.varying, *found.seeds))
+    block = kernels.drawn(Formula.of((Part(kind),)), "layer", OVER, 3)
+    found = derivatives(block, kernels.carried(3))
+    inner = dependent((*found.sums, *found.carried), (*block.varying, *found.cotangents))
     drawn = sum(map(_weight, dependent(block.outputs, block.varying)))
     return 2 * drawn + sum(map(_weight, inner)) + len(found.sums)
 

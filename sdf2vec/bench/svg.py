@@ -19,6 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .. import api
+from ..arrays import Float64Array
 from ..engines import ENGINES
 from ..export.options import Options
 from ..export.svg import smallest
@@ -28,7 +29,7 @@ from ..image import Picture, load, premultiply
 from ..render.draw import draw
 from ..scene import Scene
 
-Pixels = NDArray[np.float64]  # [H, W, 4] premultiplied RGBA, 0..1
+Pixels = Float64Array  # [H, W, 4] premultiplied RGBA, 0..1
 
 ALPHA = "alpha: "  # before the names of pictures with alpha
 SMALLEST = "smallest"  # the smallest drawing with filters

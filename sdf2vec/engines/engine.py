@@ -10,12 +10,13 @@ from typing import Any
 from xml.etree import ElementTree
 
 import numpy as np
-from numpy.typing import NDArray
 from PIL import Image
 
 from sdf2vec.errors import Sdf2vecError
 
-Picture = NDArray[np.float32]  # [height, width, 4], row 0 is the top of the picture
+from ..arrays import Float32Array
+
+Picture = Float32Array  # [height, width, 4], row 0 is the top of the picture
 Uniforms = Mapping[str, float | tuple[float, ...]]
 
 SVG_NAMESPACE = "http://www.w3.org/2000/svg"

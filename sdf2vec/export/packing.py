@@ -17,8 +17,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 import torch
-from numpy.typing import NDArray
 
+from ..arrays import Float32Array, IntArray
 from ..blend import COMPOSITING, MIN_FALLOFF_PIXELS
 from ..expr import VEC2, VECTOR, Expr, components_of, const, constant, operation, scalarize, substitute, var
 from ..layer import JOIN, LOOK, slots
@@ -48,7 +48,6 @@ WORST = 4096  # pixels that are looked at in each round
 FAINT = 0.05  # opacity below which layers are not told apart
 PLACE = "place"  # the precision of what lies in a layer's box: bits by how sharp its edge is
 
-Floats = NDArray[np.float32]
 Limits = tuple[float, float]
 
 CORNER, BOX = var("corner", VEC2), var("box", VEC2)
@@ -133,7 +132,7 @@ def pack(scene: Scene, slack: float = 0.0, limit: float = LIMIT) -> Packed:
     return packer.pack(precision, counts, found)
 
 
-def _largest(difference: Floats) -> float:
+def _largest(difference: Float32Array) -> float:
     return float(np.abs(difference).max()) * 255.0
 
 
@@ -187,20 +186,20 @@ class _View:
         x, y, self.pixel = reference.canvas(from_scene(scene), self.width, self.height)
         self.x, self.y = (v.reshape(self.height, self.width)[::step, ::step].flatten() for v in (x, y))
 
-    def picture(self, scene: Scene) -> Floats:
+    def picture(self, scene: Scene) -> Float32Array:
         """The scene's pixels, [4, P]."""
         if self.whole:
-            pixels: Floats = draw(scene, self.width, self.height).numpy()
+            pixels: Float32Array = draw(scene, self.width, self.height).numpy()
             return pixels.reshape(4, -1)
         with torch.no_grad(), threads_of_its_own():
             image = reference.composite_points(from_scene(scene), self.x, self.y, self.pixel)
-            sample: Floats = reference.displayed(image).numpy()
+            sample: Float32Array = reference.displayed(image).numpy()
             return sample
 
-    def coverages(self, scene: Scene, chosen: NDArray[np.int64]) -> Floats:
+    def coverages(self, scene: Scene, chosen: IntArray) -> Float32Array:
         """Coverage of every layer at some of the pixels, [L, B]."""
         covers, _ = reference.layers_at(from_scene(scene), self.x[chosen], self.y[chosen], self.pixel)
-        found: Floats = covers.numpy()
+        found: Float32Array = covers.numpy()
         return found
 
 
@@ -247,9 +246,7 @@ class _Packer:
         sizes = (cells[2] - cells[0] + 1, cells[3] - cells[1] + 1)
         return math.hypot(*sizes) / self.grid.per_unit / softness
 
-    def to_blame(
-        self, view: _View, chosen: NDArray[np.int64], counts: NDArray[np.int64]
-    ) -> NDArray[np.int64]:
+    def to_blame(self, view: _View, chosen: IntArray, counts: IntArray) -> IntArray:
         """The layers whose coarse places can be why the picture is off at some pixels."""
         cover = np.abs(view.coverages(self.scene, chosen))
         steep = np.array([self._steepness(*pair) for pair in zip(self.scene.layers, self.cells, strict=True)])

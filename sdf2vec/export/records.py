@@ -11,8 +11,8 @@ from functools import cache
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ..arrays import Float32Array, IntArray
 from ..blend import COMPOSITING, JOINS
 from ..expr import (
     VEC4,
@@ -33,8 +33,6 @@ from ..layer import PIXEL, STILL, P, cover_of, shape_at
 from ..paints import FLAT, PAINTS
 from ..scene import Layer, Scene, Shape
 from ..shapes import KINDS
-
-Floats = NDArray[np.float32]
 
 OPACITY, FALLOFF, COUNT, SMOOTHNESS, JOIN = range(
     5
@@ -165,7 +163,7 @@ def form_of(scene: Scene) -> Form:
     return Form(variants_of(scene), joins_of(scene), scene.compositing)
 
 
-def records(scene: Scene, form: Form) -> Floats:
+def records(scene: Scene, form: Form) -> Float32Array:
     """All records, [shapes, stride, 4]."""
     table = np.zeros((scene.shape_count, form.stride * 4), np.float32)
     rows = (row for layer in scene.layers for row in _records(layer, form))
@@ -174,7 +172,7 @@ def records(scene: Scene, form: Form) -> Floats:
     return table.reshape(scene.shape_count, form.stride, 4)
 
 
-def first_records(layers: Sequence[Layer]) -> NDArray[np.int64]:
+def first_records(layers: Sequence[Layer]) -> IntArray:
     """Which record each layer begins with, [L]."""
     return np.cumsum([0, *(len(layer.shapes) for layer in layers)], dtype=np.int64)[:-1]
 

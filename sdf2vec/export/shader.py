@@ -8,8 +8,8 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ..arrays import Float32Array, IntArray
 from ..blend import BREATH, COMPOSITING, FRAMINGS, breath, display, grid_point, surface_point
 from ..errors import Sdf2vecError
 from ..expr import VEC2, Expr, const, var, vec2, vec4
@@ -39,8 +39,6 @@ from .records import BELOW, COUNT, JOIN, OWN, Form, first_records, form_of, reco
 from .tiles import COARSEST, Tiles
 
 DATA_WIDTH = 256  # texels in a row of a data texture
-
-Floats = NDArray[np.float32]
 
 
 @dataclass(frozen=True)
@@ -72,7 +70,7 @@ class Shader:
 
     text: str
     choice: Choice
-    data: Floats | None = None
+    data: Float32Array | None = None
     error: float = 0.0
 
     @property
@@ -259,7 +257,7 @@ def _data(job: _Job) -> dict[str, Any]:
     }
 
 
-def data_array(rows: Floats, numbers: NDArray[np.int64]) -> Floats:
+def data_array(rows: Float32Array, numbers: IntArray) -> Float32Array:
     """Records [R, 4] and whole numbers [M] after them as texels, [rows, DATA_WIDTH, 4]."""
     flat = np.concatenate([rows.ravel(), numbers.astype(np.float32)])
     padded = np.zeros(-(-len(flat) // (4 * DATA_WIDTH)) * 4 * DATA_WIDTH, np.float32)
@@ -311,7 +309,7 @@ def _grid_part(job: _Job, tiles: Tiles) -> dict[str, Any]:
     }
 
 
-def _rows(table: Floats) -> list[list[str]]:
+def _rows(table: Float32Array) -> list[list[str]]:
     """The text of each vec4 of the records, [stride][shapes]."""
     return [[_vec4(row) for row in rows.tolist()] for rows in table.swapaxes(0, 1)]
 

@@ -13,8 +13,8 @@ from functools import cache
 
 import numpy as np
 import torch
-from numpy.typing import NDArray
 
+from ..arrays import BoolArray, Float64Array, IntArray
 from ..blend import COMPOSITING
 from ..expr import components_of, var
 from ..layer import Formula, P, Structure
@@ -22,10 +22,6 @@ from ..lower.torch import Tensors, compile_torch
 from ..render.fused import uniform_rows
 from ..render.tensors import Group, from_scene
 from ..scene import Scene
-
-Floats = NDArray[np.float64]
-Integers = NDArray[np.int64]
-Flags = NDArray[np.bool_]
 
 COARSEST = 0.01  # scene units a pixel: lists hold where the picture's shortest side has 100 pixels or more
 MARGIN = 1e-4  # cells: room for a shader's rounding where two cells meet
@@ -48,12 +44,12 @@ class Grid:
     def high(self) -> tuple[float, float]:
         return self.low[0] + self.columns / self.per_unit, self.low[1] + self.rows / self.per_unit
 
-    def middles(self) -> Floats:
+    def middles(self) -> Float64Array:
         """The middle of each cell (its part within the scene), [cells, 2]."""
         x, y = np.meshgrid(np.arange(self.columns) + 0.5, np.arange(self.rows) + 0.5)
         return np.stack([x, y], axis=-1).reshape(-1, 2) / self.per_unit + self.low
 
-    def regions(self) -> Floats:
+    def regions(self) -> Float64Array:
         """What each cell covers, [cells, 4]: low x, low y, high x, high y; endless at the border."""
         x, y = self._edges(self.columns), self._edges(self.rows)
         x, y = x / self.per_unit + self.low[0], y / self.per_unit + self.low[1]
@@ -62,7 +58,7 @@ class Grid:
         return np.concatenate([lows, highs], axis=1)
 
     @staticmethod
-    def _edges(count: int) -> Floats:
+    def _edges(count: int) -> Float64Array:
         """Lower and upper edges of the cells along one side, [2, count], in cells."""
         places = np.arange(count + 1, dtype=np.float64)
         low, high = places[:-1] - MARGIN, places[1:] + MARGIN
@@ -75,8 +71,8 @@ class Tiles:
     """`entries[starts[t]:starts[t + 1]]` are the layers of cell t (row by row), in draw order."""
 
     grid: Grid
-    starts: Integers  # [cells + 1]
-    entries: Integers  # [E]
+    starts: IntArray  # [cells + 1]
+    entries: IntArray  # [E]
 
     @property
     def depth(self) -> float:
@@ -88,10 +84,10 @@ class Tiles:
 class Bounds:
     """Of every layer, in draw order: a box that holds its coverage, and within which distances it is 0 and 1."""
 
-    boxes: Floats  # [L, 4]
-    outer: Floats  # [L]
-    inner: Floats  # [L]
-    slopes: Floats  # [L]
+    boxes: Float64Array  # [L, 4]
+    outer: Float64Array  # [L]
+    inner: Float64Array  # [L]
+    slopes: Float64Array  # [L]
 
 
 def scene_grid(scene: Scene, across: int) -> Grid:
@@ -110,8 +106,8 @@ def bin_layers(scene: Scene, grid: Grid, slack: float = 0.0) -> Tiles:
         return Tiles(grid, np.zeros(grid.cells + 1, np.int64), np.zeros(0, np.int64))
     bounds, regions = layer_bounds(scene, slack), grid.regions()
     layers, cells = np.nonzero(_overlap(bounds.boxes, regions))  # by layer, so in draw order within each cell
-    bounded: Flags = np.all(np.isfinite(regions), axis=1)[cells]
-    leaves: Flags = np.any(bounds.boxes[:, :2] < np.array(grid.low), axis=1) | np.any(
+    bounded: BoolArray = np.all(np.isfinite(regions), axis=1)[cells]
+    leaves: BoolArray = np.any(bounds.boxes[:, :2] < np.array(grid.low), axis=1) | np.any(
         bounds.boxes[:, 2:] > np.array(grid.high), axis=1
     )
     distances = layer_distances(scene, layers, grid.middles()[cells])
@@ -128,10 +124,10 @@ def bin_layers(scene: Scene, grid: Grid, slack: float = 0.0) -> Tiles:
     return Tiles(grid, starts, layers[np.argsort(cells, kind="stable")])
 
 
-def _overlap(boxes: Floats, regions: Floats) -> Flags:
+def _overlap(boxes: Float64Array, regions: Float64Array) -> BoolArray:
     """Which boxes [L, 4] and regions [T, 4] meet, [L, T]."""
     low, high = boxes[:, None, :2], boxes[:, None, 2:]
-    flags: Flags = np.all((low <= regions[None, :, 2:]) & (high >= regions[None, :, :2]), axis=2)
+    flags: BoolArray = np.all((low <= regions[None, :, 2:]) & (high >= regions[None, :, :2]), axis=2)
     return flags
 
 
@@ -144,7 +140,7 @@ def layer_bounds(scene: Scene, slack: float = 0.0) -> Bounds:
     return Bounds(values[:, :4], values[:, 4], values[:, 5], values[:, 6])
 
 
-def layer_distances(scene: Scene, layers: Integers, points: Floats) -> Floats:
+def layer_distances(scene: Scene, layers: IntArray, points: Float64Array) -> Float64Array:
     """Distance of layer layers[i] at points[i]; [P], [P, 2] → [P]."""
     distances = np.zeros(len(layers))
     for group, rows in _groups(scene):

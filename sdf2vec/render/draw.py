@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 import torch
-from numpy.typing import NDArray
 
+from ..arrays import Float32Array
 from ..image import unpremultiply
 from ..scene import Scene
 from . import fused, reference
@@ -25,9 +25,9 @@ def draw(scene: Scene, width: int | None = None, height: int | None = None) -> t
     return reference.render(scene, width, height)
 
 
-def pixels_of(scene: Scene, width: int | None = None, height: int | None = None) -> NDArray[np.float32]:
+def pixels_of(scene: Scene, width: int | None = None, height: int | None = None) -> Float32Array:
     """The scene as an array [height, width, 3], or [.., 4] with straight alpha when it is transparent; 0..1."""
-    pixels: NDArray[np.float32] = draw(scene, width, height).permute(1, 2, 0).numpy()
+    pixels: Float32Array = draw(scene, width, height).permute(1, 2, 0).numpy()
     return np.ascontiguousarray(pixels[..., :3]) if scene.background else unpremultiply(pixels)
 
 

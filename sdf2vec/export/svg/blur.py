@@ -14,8 +14,8 @@ from functools import cache
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ...arrays import BoolArray, Float64Array
 from ...deferred import deferred
 from ...scene import Layer
 from ...shapes import Outline
@@ -23,7 +23,7 @@ from .canvas import Canvas
 from .isobands import contours
 from .outlines import Traced, core, distance_to, edge_of, sharpened
 from .refit_appearance import Difference
-from .sampling import Array, SampleGrid, covers, distances, edge_profile, extent, grid_over
+from .sampling import SampleGrid, covers, distances, edge_profile, extent, grid_over
 
 SHARES = (1.0, 0.7, 0.45, 0.2)  # of the corner radius that an offset outline has
 WIDTHS = (0.9, 1.0, 1.1)  # of the Gaussian
@@ -37,7 +37,7 @@ ACROSS = 1.5  # of them in a standard deviation
 MOVES = 4  # of a traced contour to where its blur is one half
 LEAST = STEPS[0]  # librsvg blurs much too little below 2
 
-gaussian_filter: Callable[..., Array] = deferred("scipy.ndimage", "gaussian_filter")
+gaussian_filter: Callable[..., Float64Array] = deferred("scipy.ndimage", "gaussian_filter")
 
 
 class Blurred(NamedTuple):
@@ -108,8 +108,8 @@ class Trial:
 
     falloff: float
     grid: SampleGrid
-    wanted: Array  # [Y, X]
-    seen: NDArray[np.bool_]  # [Y, X]
+    wanted: Float64Array  # [Y, X]
+    seen: BoolArray  # [Y, X]
     unit: float
 
     def blurred(self, outline: Outline, width: float) -> Blurred:
@@ -120,7 +120,7 @@ class Trial:
         """An outline without a blur."""
         return self.judged(outline, distance_to(outline, self.grid), 0.0)
 
-    def moved(self, field: Array, width: float) -> Iterator[Blurred]:
+    def moved(self, field: Float64Array, width: float) -> Iterator[Blurred]:
         """Contours of a field [Y, X] where it is 0, each nearer to where coverage is one half once it is blurred."""
         deviation = self._deviation(width)
         for _ in range(MOVES):
@@ -132,7 +132,7 @@ class Trial:
         wanted = width * deviation_of_edge() * self.falloff * self.unit
         return quantised(max(wanted, LEAST)) / self.unit
 
-    def judged(self, outline: Outline | Traced, distance: Array, deviation: float) -> Blurred:
+    def judged(self, outline: Outline | Traced, distance: Float64Array, deviation: float) -> Blurred:
         """An outline, drawn at these distances [Y, X] from its edge, and its errors."""
         sharp = np.clip(0.5 - distance / self.grid.step, 0.0, 1.0)
         off = self._smooth(sharp, deviation) - self.wanted
@@ -140,7 +140,7 @@ class Trial:
         error, error_cut = (float(np.sum(np.square(o)[self.seen])) * self.grid.step**2 for o in (off, cut))
         return Blurred(outline, deviation, error, error_cut, Difference(self.grid, off))
 
-    def _smooth(self, sharp: Array, deviation: float) -> Array:
+    def _smooth(self, sharp: Float64Array, deviation: float) -> Float64Array:
         if not deviation:
             return sharp
         return gaussian_filter(sharp, deviation / self.grid.step, mode="constant", truncate=3.5)

@@ -6,12 +6,12 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ...arrays import Float64Array
 from ...scene import Scene
 from ...shapes import Point
 
-Points = NDArray[np.float64]  # [N, 2]
+Points = Float64Array  # [N, 2]
 
 
 @dataclass(frozen=True)

@@ -66,7 +66,8 @@ def radial(layer: Layer, color: Color, canvas: Canvas) -> Figure:
         Stop(o, moved(color, LIFT), c) for o, c in zip(offsets.tolist(), found.tolist(), strict=True)
     )
     angle = math.atan2(frame.axis[1], frame.axis[0])
-    center, (across, down) = canvas.place(frame.origin), (half * reach * canvas.unit).tolist()
+    (center,) = pairs(canvas.places(frame.origin))
+    across, down = (half * reach * canvas.unit).tolist()
     return Figure(
         EllipseOutline(center, (across, down), angle),
         RadialGradient(center, (across, down), stops, angle),

@@ -8,10 +8,11 @@ from typing import NamedTuple
 
 import numpy as np
 
+from ...arrays import Float64Array
 from ...deferred import deferred
 from ...scene import Layer
 from .canvas import Canvas, Points
-from .sampling import Array, Box, SampleGrid, distances, edge_profile, edge_range, extent, grid_over
+from .sampling import Box, SampleGrid, distances, edge_profile, edge_range, extent, grid_over
 
 TRACE = 768  # grid cells along the canvas' shortest side
 SOFTLY = 12  # grid cells in a falloff are enough
@@ -20,7 +21,7 @@ MAX_CELLS = 2048  # grid cells along any side
 FEWEST_BANDS, MOST_BANDS = 3, 24
 BANDS_A_PIXEL = 1.4
 
-find_contours: Callable[[Array, float], list[Points]] = deferred("skimage.measure", "find_contours")
+find_contours: Callable[[Float64Array, float], list[Points]] = deferred("skimage.measure", "find_contours")
 
 
 class Band(NamedTuple):
@@ -50,7 +51,7 @@ def trace_grid(layer: Layer, canvas: Canvas) -> SampleGrid | None:
     return grid_over(box.grown(step), step)
 
 
-def contours(field: Array, level: float, grid: SampleGrid) -> list[Points]:
+def contours(field: Float64Array, level: float, grid: SampleGrid) -> list[Points]:
     """Closed contours [M, 2] of a field in scene units; what the grid cuts off is closed along its edge."""
     padded = np.pad(field, 1, constant_values=max(float(field.max()), level) + grid.step)
     corner = (grid.x[0] - grid.step, grid.y[0] - grid.step)
@@ -58,7 +59,7 @@ def contours(field: Array, level: float, grid: SampleGrid) -> list[Points]:
     return [contour[:, ::-1] * grid.step + corner for contour in found if len(contour) > 3]
 
 
-def isobands(field: Array, levels: Sequence[float], grid: SampleGrid, canvas: Canvas) -> list[Band]:
+def isobands(field: Float64Array, levels: Sequence[float], grid: SampleGrid, canvas: Canvas) -> list[Band]:
     """A band for each level of a field [Y, X], outermost first; from each to the next coverage grows alike."""
     traced = ([canvas.places(c) for c in contours(field, level, grid)] for level in levels)
     return [Band((i + 1) / len(levels), found) for i, found in enumerate(traced)]

@@ -8,12 +8,13 @@ from functools import singledispatch
 
 import numpy as np
 
+from ...arrays import Float64Array
 from ...scene import Layer
 from ...shapes import KINDS, EllipseOutline, Outline, PolygonOutline, RectangleOutline
 from .bezier_fit import smooth_path
 from .canvas import Canvas, Points, pairs
 from .display import Geometry
-from .sampling import Array, SampleGrid
+from .sampling import SampleGrid
 
 FLAT = 1e-9  # scene units: a side shorter than this is none
 LONGEST_MITRE = 4.0  # in lengths that the sides are moved by
@@ -153,7 +154,7 @@ def _(outline: PolygonOutline, share: float) -> Outline:
     return PolygonOutline(pairs(corners + moved * mitres), outline.rounding * share)
 
 
-def distance_to(outline: Outline | Traced, grid: SampleGrid) -> Array:
+def distance_to(outline: Outline | Traced, grid: SampleGrid) -> Float64Array:
     """Signed distances [Y, X] to an outline made of a convex polygon."""
     made = None if isinstance(outline, Traced) else core(outline)
     assert made is not None

@@ -9,6 +9,7 @@ from functools import cached_property
 
 import numpy as np
 
+from ...arrays import Float64Array
 from ...scene import Layer, Scene
 from .blur import Blurred, best_blur
 from .canvas import Canvas
@@ -16,7 +17,6 @@ from .compact import GRAINS, Grain, compact_blurs
 from .gradient_stops import stop_count
 from .isobands import band_count
 from .outlines import edge_of
-from .sampling import Array
 from .visibility import LayerSamples, contrasts, layers_at
 
 SHARP = 2.0  # pixels: an edge softer than this is drawn soft
@@ -95,7 +95,7 @@ class Planner:
         return layers_at(self.scene)
 
     @cached_property
-    def weights(self) -> Array:
+    def weights(self) -> Float64Array:
         return contrasts(self.scene, self.samples)
 
     @cached_property

@@ -14,11 +14,11 @@ from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ...arrays import BoolArray, Float32Array, Float64Array
 from ...deferred import deferred
 from ...scene import Layer, Scene
-from .sampling import Array, SampleGrid
+from .sampling import SampleGrid
 from .visibility import LayerSamples, showing, steps_over
 
 CELLS = 64  # of a difference that is kept, along its longest side
@@ -31,16 +31,15 @@ ROUNDING = (
     0.2  # added before 8-bit alpha is rounded down: browsers on the CPU do that, others take the nearest
 )
 
-Single = NDArray[np.float32]
 
-map_coordinates: Callable[..., Array] = deferred("scipy.ndimage", "map_coordinates")
+map_coordinates: Callable[..., Float64Array] = deferred("scipy.ndimage", "map_coordinates")
 
 
 class Difference(NamedTuple):
     """Drawn coverage minus the layer's own, [Y, X] on a grid."""
 
     grid: SampleGrid
-    off: Array | Single
+    off: Float64Array | Float32Array
 
     def coarse(self) -> Difference:
         """The same by its means over blocks of cells: all that a small canvas needs of it, and little to keep."""
@@ -88,29 +87,29 @@ class Stack:
     `first`: colours and opacities before anything was solved. `plain` [N]: whether a layer has a single colour.
     """
 
-    covers: Single
-    colors: Array
-    opacities: Array
-    ground: Array | None  # [3]
-    plain: NDArray[np.bool_]
-    first: tuple[Array, Array]
+    covers: Float32Array
+    colors: Float64Array
+    opacities: Float64Array
+    ground: Float64Array | None  # [3]
+    plain: BoolArray
+    first: tuple[Float64Array, Float64Array]
 
     @property
-    def alphas(self) -> Single:
+    def alphas(self) -> Float32Array:
         return np.asarray(self.covers * self.opacities[:, None].astype(np.float32))
 
     @property
-    def single_colors(self) -> Array:
+    def single_colors(self) -> Float64Array:
         """The colours of the layers that have a single one, [M, 3]."""
         return np.asarray(self.colors.mean(axis=2)[self.plain])
 
-    def shown(self) -> tuple[Single, Single]:
+    def shown(self) -> tuple[Float32Array, Float32Array]:
         """How much of each layer shows through those above it [N, P], and of the ground [P]."""
         alphas = self.alphas
         hidden = showing(alphas)
         return hidden, hidden[0] * (1.0 - alphas[0])
 
-    def picture(self) -> Array:
+    def picture(self) -> Float64Array:
         """Premultiplied colour and, without a ground, alpha [3 or 4, P]."""
         hidden, rest = self.shown()
         weights = hidden * self.alphas
@@ -119,22 +118,22 @@ class Stack:
             return np.asarray(color + self.ground[:, None] * rest, np.float64)
         return np.concatenate([color, 1.0 - rest[None]]).astype(np.float64)
 
-    def error(self, wanted: Array) -> float:
+    def error(self, wanted: Float64Array) -> float:
         """Mean squared difference from a picture."""
         return float(np.mean(np.square(self.picture() - wanted)))
 
-    def with_colors(self, wanted: Array) -> Stack:
+    def with_colors(self, wanted: Float64Array) -> Stack:
         """The single colours that come nearest to a picture [3 or 4, P]."""
         gram, right = self._color_equations(wanted)
         solved = _bounded(gram, right, np.zeros_like(right), np.ones_like(right))
         return self._recolored(solved)
 
-    def rounded(self, wanted: Array, steps: int, opacities: int) -> Stack:
+    def rounded(self, wanted: Float64Array, steps: int, opacities: int) -> Stack:
         """Opacities in whole steps, never 0, and the single colours in steps that then come nearest to a picture."""
         shown = np.maximum(np.round(self.opacities * opacities), 1.0) / opacities
         return replace(self, opacities=shown)._stepped(wanted, steps)
 
-    def _stepped(self, wanted: Array, steps: int) -> Stack:
+    def _stepped(self, wanted: Float64Array, steps: int) -> Stack:
         """The colours in steps, changed one by one while that brings them nearer."""
         gram, right = self._color_equations(wanted)
         colors = self.single_colors
@@ -150,7 +149,7 @@ class Stack:
                 break
         return self._recolored(np.broadcast_to(colors, (len(colors), 3)))
 
-    def with_opacities(self, wanted: Array) -> Stack:
+    def with_opacities(self, wanted: Float64Array) -> Stack:
         """The opacities that come nearest to a picture [3 or 4, P], where one layer's change leaves the others'."""
         slopes = np.stack([slope.astype(np.float32).ravel() for slope in self._slopes()])
         off = (wanted - self.picture()).astype(np.float32).ravel()
@@ -168,7 +167,7 @@ class Stack:
         ]
         return replace(scene, layers=tuple(layers))
 
-    def _slopes(self) -> Iterator[Array]:
+    def _slopes(self) -> Iterator[Float64Array]:
         """For each layer the change of the picture [3 or 4, P] with its opacity."""
         channels = 4 if self.ground is None else 3
         alphas = self.alphas
@@ -176,13 +175,13 @@ class Stack:
         for step, share in zip(steps, self.covers * showing(alphas), strict=True):
             yield (step * share)[:channels]
 
-    def _color_equations(self, wanted: Array) -> tuple[Array, Array]:
+    def _color_equations(self, wanted: Float64Array) -> tuple[Float64Array, Float64Array]:
         """Gram matrix and right side of the least squares for the single colours."""
         weights = (self.shown()[0] * self.alphas)[self.plain]
         off = (wanted - self.picture())[:3].astype(np.float32)
         return _equations(weights, off.T, self.single_colors, self.first[0].mean(axis=2)[self.plain])
 
-    def _recolored(self, solved: Array) -> Stack:
+    def _recolored(self, solved: Float64Array) -> Stack:
         colors = self.colors.copy()
         colors[self.plain] = solved[:, :, None]
         return replace(self, colors=colors)
@@ -190,7 +189,7 @@ class Stack:
 
 def _stack(
     scene: Scene, samples: LayerSamples, drawn: Mapping[int, Difference], cut: Sequence[int]
-) -> tuple[Stack, Array]:
+) -> tuple[Stack, Float64Array]:
     """The scene's layers as they are drawn, and its render, on a small canvas."""
     covers, colors, width, height = samples
     ground = None if scene.background is None else np.array(scene.background)
@@ -209,7 +208,7 @@ def _stack(
     return replace(exact, covers=off), exact.picture()
 
 
-def _add(difference: Difference, x: Array, y: Array, cover: Single) -> None:
+def _add(difference: Difference, x: Float64Array, y: Float64Array, cover: Float32Array) -> None:
     """Adds a difference to coverage [Y, X] at the places x and y, interpolated."""
     grid, off = difference
     across, down = (x - grid.x[0]) / grid.step, (y - grid.y[0]) / grid.step
@@ -220,7 +219,9 @@ def _add(difference: Difference, x: Array, y: Array, cover: Single) -> None:
         cover[np.ix_(rows, columns)] += map_coordinates(off, places, order=1, mode="nearest")
 
 
-def _equations(slopes: Single, off: Single, now: Array, first: Array) -> tuple[Array, Array]:
+def _equations(
+    slopes: Float32Array, off: Float32Array, now: Float64Array, first: Float64Array
+) -> tuple[Float64Array, Float64Array]:
     """Gram matrix [N, N] and right side [N, K] of the least squares for values that are `now` [N, K].
 
     `slopes` [N, M]: how the picture changes with each; `off` [M, K]: how far the picture is from the wanted one. A
@@ -232,7 +233,7 @@ def _equations(slopes: Single, off: Single, now: Array, first: Array) -> tuple[A
     return gram + ridge * np.eye(len(gram)), right
 
 
-def _bounded(gram: Array, right: Array, low: Array, high: Array) -> Array:
+def _bounded(gram: Float64Array, right: Float64Array, low: Float64Array, high: Float64Array) -> Float64Array:
     """Solves gram·x = right [N, K] within bounds: what leaves them is put there, and the rest solved again."""
     found = np.empty_like(right)
     for k in range(right.shape[1]):

@@ -10,7 +10,7 @@ from typing import NamedTuple
 import numpy as np
 import torch
 
-from ...arrays import Float64Array as Array
+from ...arrays import Float64Array
 from ...blend import OVER, coverage, reach, saturation
 from ...expr import components_of, const, constant, scalarize, substitute, var
 from ...layer import PIXEL, Formula, P, Structure, constant_row
@@ -50,8 +50,8 @@ class Box(NamedTuple):
 class SampleGrid(NamedTuple):
     """Centres of square cells: x [X], y [Y], `step` apart, in scene units."""
 
-    x: Array
-    y: Array
+    x: Float64Array
+    y: Float64Array
     step: float
 
 
@@ -76,7 +76,7 @@ def edge_range() -> tuple[float, float]:
     return constant(full), constant(none)
 
 
-def edge_profile(distance: Array) -> Array:
+def edge_profile(distance: Float64Array) -> Float64Array:
     """Coverage by distance in falloffs: the curve that gradients follow."""
     (cover,) = _profile()(torch.as_tensor(distance))
     return np.asarray(cover.numpy())
@@ -104,9 +104,9 @@ def extent(layer: Layer, falloffs: float | None = None) -> Box:
 class ShapeFrame(NamedTuple):
     """The coordinates that a shape is painted in: their origin, the direction of x, half the size; scene units."""
 
-    origin: Array
-    axis: Array
-    half: Array
+    origin: Float64Array
+    axis: Float64Array
+    half: Float64Array
 
 
 def frame_of(shape: Shape) -> ShapeFrame:
@@ -119,29 +119,29 @@ def frame_of(shape: Shape) -> ShapeFrame:
     return ShapeFrame(*(np.array([constant(scalar) for scalar in scalarize(part)]) for part in parts))
 
 
-def distances(layer: Layer, grid: SampleGrid) -> Array:
+def distances(layer: Layer, grid: SampleGrid) -> Float64Array:
     """Signed distances [Y, X] to a layer."""
     return np.asarray(_evaluate(layer, grid, 0.0, 1)[0])
 
 
-def covers(layer: Layer, grid: SampleGrid, pixel: float) -> Array:
+def covers(layer: Layer, grid: SampleGrid, pixel: float) -> Float64Array:
     """Coverage [Y, X] of a layer for pixels of a size in scene units."""
     return np.asarray(_evaluate(layer, grid, pixel, 2)[1])
 
 
-def cover_at(layer: Layer, places: Array, pixel: float) -> Array:
+def cover_at(layer: Layer, places: Float64Array, pixel: float) -> Float64Array:
     """Coverage [N] of a layer at points [N, 2], for pixels of a size in scene units."""
     flat = [torch.tensor(value, dtype=torch.float64) for value in (pixel, *layer.numbers)]
     x, y = torch.from_numpy(np.ascontiguousarray(places)).T
     return np.asarray(_formula(layer.structure, 2)(x, y, *flat)[1].numpy())
 
 
-def colors(layer: Layer, grid: SampleGrid) -> Array:
+def colors(layer: Layer, grid: SampleGrid) -> Float64Array:
     """The colour [3, Y, X] of a layer, which varies in a smooth union."""
     return _evaluate(layer, grid, 0.0, 5)[2:]
 
 
-def _evaluate(layer: Layer, grid: SampleGrid, pixel: float, count: int) -> Array:
+def _evaluate(layer: Layer, grid: SampleGrid, pixel: float, count: int) -> Float64Array:
     """The first `count` of distance, coverage, red, green, blue: [count, Y, X]."""
     flat = [torch.tensor(value, dtype=torch.float64) for value in (pixel, *layer.numbers)]
     formula = _formula(layer.structure, count)

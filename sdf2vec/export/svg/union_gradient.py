@@ -6,12 +6,13 @@ from typing import NamedTuple
 
 import numpy as np
 
+from ...arrays import Float64Array
 from ...paints import PAINTS
 from ...scene import Color, Layer, Shape
 from .canvas import Canvas, pairs
 from .display import LinearGradient, Stop, moved
 from .isobands import seen
-from .sampling import Array, colors, covers, frame_of, grid_over
+from .sampling import colors, covers, frame_of, grid_over
 
 STOPS = 7
 CELLS = 48  # of the grid along the longest side
@@ -75,7 +76,9 @@ def mean_color(shape: Shape) -> Color:
     return red, green, blue
 
 
-def nearest_gradient(places: Array, wanted: Array, weight: Array) -> tuple[Array, Array, float]:
+def nearest_gradient(
+    places: Float64Array, wanted: Float64Array, weight: Float64Array
+) -> tuple[Float64Array, Float64Array, float]:
     """Places [S, 2] and colours [S, 3] of the stops nearest to colours [P, 3] at places [P, 2], and their error.
 
     Least squares, weighted by [P], for the direction first, then for the stops.

@@ -10,10 +10,11 @@ from dataclasses import replace
 
 import numpy as np
 
+from ...arrays import Float64Array
 from ...scene import Layer, Shape
 from .canvas import Canvas
 from .isobands import Band, band_edges, isobands, trace_grid
-from .sampling import Array, SampleGrid, colors, covers
+from .sampling import SampleGrid, colors, covers
 
 LEAST = 1e-6
 
@@ -27,7 +28,7 @@ def part_bands(layer: Layer, count: int, canvas: Canvas) -> list[list[Band]]:
     return [isobands(-alpha, levels, grid, canvas) for alpha in alphas(layer, grid, 1.0 / canvas.unit)]
 
 
-def alphas(layer: Layer, grid: SampleGrid, pixel: float) -> list[Array]:
+def alphas(layer: Layer, grid: SampleGrid, pixel: float) -> list[Float64Array]:
     """The alpha [Y, X] of each seen shape's part, lowest first."""
     cover = covers(layer, grid, pixel)
     found, above = [], np.zeros_like(cover)
@@ -38,9 +39,9 @@ def alphas(layer: Layer, grid: SampleGrid, pixel: float) -> list[Array]:
     return found[::-1]
 
 
-def shares(layer: Layer, grid: SampleGrid) -> list[Array]:
+def shares(layer: Layer, grid: SampleGrid) -> list[Float64Array]:
     """How much of each seen shape's colour the layer has at each point [Y, X]; they add up to 1."""
-    found: list[Array] = []
+    found: list[Float64Array] = []
     places = [index for index, part in enumerate(layer.structure) if part.adds]
     for first in range(0, len(places), 3):  # three at a time, as red, green and blue
         marked = list(layer.shapes)

@@ -8,9 +8,9 @@ from typing import NamedTuple, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
+from ...arrays import Float64Array
 from ...deferred import deferred
 from ...scene import Scene
-from .sampling import Array
 
 pixel_points = deferred("sdf2vec.render.reference", "canvas")
 covers_at = deferred("sdf2vec.render.reference", "layers_at")
@@ -26,13 +26,13 @@ AT_ONCE = 1 << 20  # of them, for a formula holds dozens of numbers for each
 class LayerSamples(NamedTuple):
     """Coverage [N, P] and colour [N, 3, P or 1] of all layers on a small canvas, P = width × height."""
 
-    covers: Array
-    colors: Array
+    covers: Float64Array
+    colors: Float64Array
     width: int
     height: int
 
 
-def contrasts(scene: Scene, samples: LayerSamples) -> Array:
+def contrasts(scene: Scene, samples: LayerSamples) -> Float64Array:
     """[N]: the mean squared change of the picture, per channel, that an error 1 of each layer's coverage makes.
 
     It counts what lies below the layer and how much of it later layers hide; the mean is over the layer's soft edge.
@@ -58,7 +58,9 @@ def showing(alphas: NDArray[Float]) -> NDArray[Float]:
     return hidden
 
 
-def steps_over(alphas: NDArray[Float], colors: Array, ground: Array | None) -> Iterator[Array]:
+def steps_over(
+    alphas: NDArray[Float], colors: Float64Array, ground: Float64Array | None
+) -> Iterator[Float64Array]:
     """For each layer, lowest first, its opaque colour minus what lies below it, premultiplied RGBA [4, P].
 
     `alphas` [N, P], `colors` [N, 3, P or 1], `ground` [3] or None for a transparent one.
