@@ -25,8 +25,8 @@ from .fit.presets import DEFAULT, PRESETS
 from .fit.settings import DEVICES, LOSS_NAMES, settings_of
 from .image import Picture, encode_png, load
 from .scene import Scene
-from .scene import load as load_scene
-from .scene import loads as loads_scene
+from .scene_file import load as load_scene
+from .scene_file import loads as loads_scene
 from .shapes import KINDS
 
 if TYPE_CHECKING:

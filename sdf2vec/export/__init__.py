@@ -6,7 +6,8 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 from ..errors import Sdf2vecError
-from ..scene import Scene, dumps
+from ..scene import Scene
+from ..scene_file import dumps
 from . import component, page, raster, shader, svg
 from .options import Options
 

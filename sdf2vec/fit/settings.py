@@ -18,7 +18,7 @@ from ..image import load as load_picture
 from ..image import resize
 from ..paints import FLAT
 from ..scene import MAX_JOINED, MAX_SHAPES, Color, Scene
-from ..scene import load as load_scene
+from ..scene_file import load as load_scene
 from ..shapes import KINDS
 from .presets import DEFAULT, PRESETS, SOFTEST, Loss, Preset
 
