@@ -64,8 +64,6 @@ _REFUSAL = re.compile(  # what msgspec says of a value
     r"(?:Object missing required field `(?P<missing>\w+)`|Expected `(?P<kind>\w+)`(?: (?P<bound>[<>]=? \S+))?"
     r"(?P<length> of length (?:[<>]= )?\d+)?(?:, got .*)?|Number out of range)(?: - at `\$\.?(?P<path>.*)`)?"
 )
-_REPR = reprlib.Repr()  # short, and safe, whatever it is: a million numbers, deep nests
-_REPR.maxlevel = 3
 
 
 def checked(hint: Any, value: Any) -> Any:
@@ -93,8 +91,8 @@ def _refusal(error: str, value: Any) -> SceneError:
 
 
 def shown(value: Any) -> str:
-    """Something in at most 40 characters of a message."""
-    text = f"{value:g}" if isinstance(value, float) else _REPR.repr(value)
+    """Anything, a million numbers or a deep nest, in at most 40 characters of a message."""
+    text = f"{value:g}" if isinstance(value, float) else reprlib.repr(value)
     return text if len(text) <= 40 else f"{text[:37]}..."
 
 
@@ -138,10 +136,7 @@ def numbers_of(
 
     Raises SceneError for a value that is missing, unknown or out of range.
     """
-    given = {}
-    for parameter in parameters:
-        if parameter.name in values:
-            given[parameter.name] = _rounded(values[parameter.name], parameter.unit.decimals)
+    given = {p.name: _rounded(values[p.name], p.unit.decimals) for p in parameters if p.name in values}
     if len(given) < len(values):
         refuse_unknown(values, [*others, *(parameter.name for parameter in parameters)])
     record = checked(_record(parameters), given)
@@ -355,8 +350,9 @@ def _refuse_signs(layer: Layer, path: str) -> None:
         raise SceneError(f"{path}.opacity", f"must be >= 0, got {layer.opacity:g}")
     for index, shape in enumerate(layer.shapes):
         inner = f"{path}.shapes[{index}]" if layer.joints else path
+        rest = iter((*shape.color, *shape.paint_parameters))
         for parameter in PAINTS[shape.paint].parameters:
-            numbers = shape.painted()[parameter.name] if parameter.unit is COLOR else ()
-            for place, number in enumerate(numbers):
-                if number < 0.0:
-                    raise SceneError(f"{inner}.{parameter.name}[{place}]", f"must be >= 0, got {number:g}")
+            numbers = _taken(rest, (parameter,))
+            if parameter.unit is COLOR and min(numbers) < 0.0:
+                place = f"{inner}.{parameter.name}[{numbers.index(min(numbers))}]"
+                raise SceneError(place, f"must be >= 0, got {min(numbers):g}")

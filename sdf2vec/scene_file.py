@@ -130,14 +130,12 @@ def loads(text: str | bytes) -> Scene:
 def load(path: str | os.PathLike[str]) -> Scene:
     """A scene from a JSON file. Raises Sdf2vecError, whose one line names the file and the field."""
     try:
-        text = Path(path).read_bytes()
+        return loads(Path(path).read_bytes())
+    except SceneError as error:
+        raise Sdf2vecError(f"{one_line(str(path))}: {error}") from None
     except (OSError, ValueError) as error:  # ValueError: a NUL character in the path
         reason = getattr(error, "strerror", None) or error
         raise Sdf2vecError(f"{one_line(str(path))}: cannot read the scene ({reason})") from None
-    try:
-        return loads(text)
-    except SceneError as error:
-        raise Sdf2vecError(f"{one_line(str(path))}: {error}") from None
 
 
 class _Repeated:
@@ -165,8 +163,7 @@ def _integer(digits: str) -> int | float:
 
 
 def _pairs(pairs: list[tuple[str, Any]]) -> dict[str, Any] | _Repeated:
-    made = dict(pairs)
-    if len(made) == len(pairs):
+    if len(made := dict(pairs)) == len(pairs):
         return made
     return _Repeated(Counter(name for name, _ in pairs).most_common(1)[0][0])
 
