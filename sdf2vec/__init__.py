@@ -13,7 +13,8 @@ import sdf2vec.render  # noqa: F401 (see above)
 from .api import check, export, exported, fit, render
 from .errors import Sdf2vecError
 from .export.exported import Exported
-from .scene import Joint, Layer, Scene, SceneError, Shape, dumps, load, loads, save
+from .scene import Joint, Layer, Scene, SceneError, Shape
+from .scene_file import dumps, load, loads, save
 from .shapes import KINDS
 
 __version__ = "0.1.0"

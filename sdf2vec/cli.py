@@ -27,8 +27,8 @@ from .exports import Exports
 from .files import one_line, require_writable, write_atomically
 from .fit.settings import Settings, settings_of
 from .scene import Scene
-from .scene import load as load_scene
-from .scene import loads as loads_scene
+from .scene_file import load as load_scene
+from .scene_file import loads as loads_scene
 
 if TYPE_CHECKING:
     from .fit.loop import Progress

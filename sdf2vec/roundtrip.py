@@ -23,7 +23,8 @@ from .exports import Exports
 from .image import fitted_size, premultiply
 from .render.draw import draw, draw_fast, is_large
 from .render.reference import render
-from .scene import Scene, dumps
+from .scene import Scene
+from .scene_file import dumps
 
 Pixels = Float32Array  # [height, width, 4] premultiplied RGBA
 Size = tuple[int, int]

@@ -1,38 +1,41 @@
-"""The scene: what a fit returns, and all that a renderer or an exporter takes. JSON in and out.
+"""The scene: what a fit returns, and all that a renderer or an exporter takes. `scene_file` reads and writes it.
 
 Numbers are rounded when a scene is made (geometry to 6 decimals: 0.001 pixel at 1000 pixels; colours to 5),
-so that the file says exactly what was rendered and `loads(dumps(scene)) == scene`.
+so that its file says exactly what was rendered. msgspec checks them against what their units declare.
 """
 
 from __future__ import annotations
 
-import json
 import math
-import os
+import re
 import reprlib
-from collections import Counter
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
-from pathlib import Path
-from typing import Any, NamedTuple
+from functools import lru_cache
+from itertools import islice
+from typing import Annotated, Any, NamedTuple
+
+import msgspec
+from msgspec import Meta
 
 from .blend import COMPOSITING, JOINS, OVER, UNION
 from .errors import Sdf2vecError
-from .files import one_line, write_atomically
-from .layer import Part, Structure
-from .paints import BASE, FLAT, PAINTS, Paint
-from .shapes import KINDS, Kind
-from .units import COLOR_DECIMALS, GEOMETRY_DECIMALS, LONGEST_CANVAS, Parameter
+from .layer import JOIN, LOOK, Part, Structure
+from .paints import BASE, FLAT, PAINTS
+from .shapes import KINDS
+from .units import BACKGROUND, COLOR, Parameter
 
-FORMAT = "sdf2vec scene"
-VERSION = 2
 MAX_SHAPES = 65536
 MAX_JOINED = 128  # shapes in one layer: each is a term of one formula
-MAX_SIDE = 65536  # pixels
 
+Side = Annotated[int, Meta(ge=1, le=65536)]  # pixels
+Joined = Annotated[list[Any], Meta(min_length=1, max_length=MAX_JOINED)]
 Color = tuple[float, float, float]
+Value = float | tuple[float, ...]  # of a parameter
 BLACK: Color = (0.0, 0.0, 0.0)
+GROUND = Parameter("background", BACKGROUND, BLACK)
+OPTIONAL = (*LOOK, JOIN)  # where no value is given, it is that of `start`
 
 
 class SceneError(Sdf2vecError):
@@ -45,82 +48,115 @@ class SceneError(Sdf2vecError):
 
 
 @contextmanager
-def _within(path: str) -> Iterator[None]:
+def within(path: str) -> Iterator[None]:
     """Puts `path` before the path of an error raised inside."""
     try:
         yield
     except SceneError as error:
-        joint = "" if not error.path or error.path.startswith("[") else "."
-        raise SceneError(f"{path}{joint}{error.path}", error.problem) from None
+        dot = "" if not error.path or error.path.startswith("[") else "."
+        raise SceneError(f"{path}{dot}{error.path}", error.problem) from None
 
 
-# --- checking numbers --------------------------------------------------------------------------------------
+# --- checking ----------------------------------------------------------------------------------------------
+
+_NOUNS = {"float": "number", "int": "whole number", "array": "list"}
+_REFUSAL = re.compile(  # what msgspec says of a value
+    r"(?:Object missing required field `(?P<missing>\w+)`|Expected `(?P<kind>\w+)`(?: (?P<bound>[<>]=? \S+))?"
+    r"(?P<length> of length (?:[<>]= )?\d+)?(?:, got .*)?|Number out of range)(?: - at `\$\.?(?P<path>.*)`)?"
+)
 
 
-def _number(value: Any, path: str, decimals: int = GEOMETRY_DECIMALS) -> float:
-    """`value` as a rounded float; −0 becomes 0."""
-    if isinstance(value, bool) or not isinstance(value, (int, float)):
-        raise SceneError(path, f"must be a number, got {_shown(value)}")
+def checked(hint: Any, value: Any) -> Any:
+    """A value as a type. Raises SceneError, which says what is wrong where in it."""
     try:
-        number = float(value)
-    except OverflowError:
-        number = math.inf
-    if not math.isfinite(number):
-        raise SceneError(path, f"must be finite, got {number}")
-    return round(number, decimals) + 0.0
+        return msgspec.convert(value, hint)
+    except msgspec.ValidationError as error:
+        raise _refusal(str(error), value) from None
 
 
-def _between(value: Any, path: str, low: float, high: float, decimals: int = GEOMETRY_DECIMALS) -> float:
-    number = _number(value, path, decimals)
-    if not low <= number <= high:
-        raise SceneError(path, f"must be between {low:g} and {high:g}, got {number:g}")
-    return number
+def _refusal(error: str, value: Any) -> SceneError:
+    """What msgspec says of a value, in our words."""
+    missing, kind, bound, length, path = _REFUSAL.fullmatch(error).groups(default="")  # type: ignore[union-attr]
+    if missing:
+        return SceneError(missing, "missing")
+    for name, index in re.findall(r"(\w+)|\[(\d+)\]", path):
+        value = value[name or int(index)]
+    wanted = f"a {_NOUNS.get(kind)}{length}"
+    if not kind or (isinstance(value, float) and not math.isfinite(value)):
+        wanted = "finite"
+    elif bound:
+        sign, limit = bound.split()
+        wanted = f"{sign} {float(limit):g}"
+    return SceneError(path, f"must be {wanted}, got {shown(value)}")
 
 
-def _color(value: Any, path: str) -> Color:
-    if not isinstance(value, (list, tuple)) or len(value) != 3:
-        raise SceneError(path, f"must be a list of 3 numbers, got {_shown(value)}")
-    red, green, blue = (_number(v, f"{path}[{i}]", COLOR_DECIMALS) for i, v in enumerate(value))
-    return red, green, blue
-
-
-def _whole(value: Any, path: str, low: int, high: int) -> int:
-    if isinstance(value, bool) or not isinstance(value, int):
-        raise SceneError(path, f"must be a whole number, got {_shown(value)}")
-    if not low <= value <= high:
-        raise SceneError(path, f"must be between {low} and {high}, got {_shown(value)}")
-    return value
-
-
-def _shown(value: Any) -> str:
-    text = _REPR.repr(value)
+def shown(value: Any) -> str:
+    """Anything, a million numbers or a deep nest, in at most 40 characters of a message."""
+    text = f"{value:g}" if isinstance(value, float) else reprlib.repr(value)
     return text if len(text) <= 40 else f"{text[:37]}..."
 
 
-class _Repr(reprlib.Repr):
-    """Short, and safe, whatever a file holds: a million numbers, a number of a thousand digits, deep nests."""
-
-    def repr1(self, x: Any, level: int) -> str:
-        return super().repr1(dict(x) if isinstance(x, dict) else x, level)
-
-
-_REPR = _Repr()
-_REPR.maxlevel = 3
+def one_of(value: Any, path: str, known: Collection[str]) -> str:
+    """A known name. Raises SceneError."""
+    if not isinstance(value, str) or value not in known:
+        raise SceneError(path, f"must be one of {', '.join(known)}, got {shown(value)}")
+    return value
 
 
-def _field(name: str) -> str:
+def refuse_unknown(names: Iterable[str], known: Sequence[str]) -> None:
+    """Raises SceneError for the first field that is not known."""
+    for name in names:
+        if name not in known:
+            raise SceneError(field_of(name), f"unknown; known are {', '.join(known)}")
+
+
+def field_of(name: str) -> str:
     """A field's name, of which a file may make anything, as part of a path."""
-    return name if name.isidentifier() and len(name) <= 40 else _shown(name)
+    return name if name.isidentifier() and len(name) <= 40 else shown(name)
 
 
-def _in_range(parameter: Parameter, value: float, path: str) -> None:
-    low, high = parameter.unit.low, parameter.unit.high
-    if parameter.positive and value <= low:
-        raise SceneError(path, f"must be > {low:g}, got {value:g}")
-    if value < low:
-        raise SceneError(path, f"must be >= {low:g}, got {value:g}")
-    if value > high:
-        raise SceneError(path, f"must be <= {high:g}, got {value:g}")
+@lru_cache(maxsize=4096)
+def _record(parameters: tuple[Parameter, ...]) -> type[msgspec.Struct]:
+    """A field for each parameter: its number, or as many as it has, in the range of its unit."""
+    fields: list[Any] = []
+    for parameter in parameters:
+        low, high = parameter.unit.low, parameter.unit.high
+        least = Meta(gt=low) if parameter.positive else Meta(ge=low)
+        number = Annotated[float, least, Meta(le=high)]
+        hint: Any = number if parameter.width == 1 else tuple[(number,) * parameter.width]  # type: ignore[misc]
+        default = [parameter.values_from(parameter.start)] if parameter in OPTIONAL else []
+        fields.append((parameter.name, hint, *default))
+    return msgspec.defstruct("Numbers", fields, kw_only=True)
+
+
+def numbers_of(
+    parameters: tuple[Parameter, ...], values: Mapping[str, Any], others: Sequence[str] = ()
+) -> tuple[float, ...]:
+    """The flat row of some parameters, rounded, from their values by name. `others` may stand beside them.
+
+    Raises SceneError for a value that is missing, unknown or out of range.
+    """
+    given = {p.name: _rounded(values[p.name], p.unit.decimals) for p in parameters if p.name in values}
+    if len(given) < len(values):
+        refuse_unknown(values, [*others, *(parameter.name for parameter in parameters)])
+    record = checked(_record(parameters), given)
+    flat: list[float] = []
+    for value in msgspec.structs.astuple(record):
+        flat += value if isinstance(value, tuple) else (value,)
+    return tuple(flat)
+
+
+def _rounded(value: Any, decimals: int) -> Any:
+    """A float, or those of a list, rounded; −0 becomes 0. Whatever else as it is."""
+    if isinstance(value, (list, tuple)):
+        return [round(float(v), decimals) + 0.0 if isinstance(v, float) else v for v in value]
+    return round(float(value), decimals) + 0.0 if isinstance(value, float) else value
+
+
+def named(parameters: Iterable[Parameter], row: Iterable[float]) -> dict[str, Value]:
+    """Values by name from the numbers that come next in a row."""
+    rest = iter(row)
+    return {p.name: p.values_from([next(rest) for _ in range(p.width)]) for p in parameters}
 
 
 # --- the scene ---------------------------------------------------------------------------------------------
@@ -141,31 +177,51 @@ class Shape:
     paint_parameters: tuple[float, ...] = ()
 
     def __post_init__(self) -> None:
-        kind, paint = _kind(self.kind), _paint(self.paint)
-        checked = _checked(self.parameters, kind.parameters, "parameters", f"a {kind.name}")
-        object.__setattr__(self, "parameters", checked)
-        own = _checked(self.paint_parameters, paint.own, "paint_parameters", f"the paint {paint.name}")
+        kind, paint = KINDS[one_of(self.kind, "kind", KINDS)], PAINTS[one_of(self.paint, "paint", PAINTS)]
+        row = _checked_row(kind.parameters, self.parameters, "parameters", f"a {kind.name}")
+        own = _checked_row(paint.own, self.paint_parameters, "paint_parameters", f"the paint {paint.name}")
+        object.__setattr__(self, "parameters", row)
         object.__setattr__(self, "paint_parameters", own)
-        object.__setattr__(self, "color", _color(self.color, "color"))
+        object.__setattr__(self, "color", numbers_of((BASE,), {BASE.name: self.color}))
 
     @classmethod
     def of(
         cls, kind: str, color: Color = BLACK, paint: str = FLAT, **values: float | Sequence[float]
     ) -> Shape:
         """A shape from parameters by name: `Shape.of("circle", (1, 0, 0), center=(0, 0), radius=0.2)`."""
-        own = {parameter.name for parameter in _paint(paint).own}
-        shape = {name: value for name, value in values.items() if name not in own}
-        painted = {name: value for name, value in values.items() if name in own}
-        row = _flatten(_kind(kind).parameters, shape, f"a {kind}")
-        return cls(kind, row, color, paint, _flatten(_paint(paint).own, painted, f"the paint {paint}"))
+        part = Part(one_of(kind, "kind", KINDS), one_of(paint, "paint", PAINTS))
+        return cls.from_numbers(part, iter(numbers_of(part.parameters, {BASE.name: color, **values})))
 
-    def named(self) -> dict[str, float | tuple[float, ...]]:
-        """The kind's parameters by name: a float, or a tuple for those of two components."""
-        return _named(KINDS[self.kind].parameters, self.parameters)
+    @classmethod
+    def from_numbers(cls, part: Part, rest: Iterator[float]) -> Shape:
+        """The shape of the numbers that come next in a layer's row, after the smoothness."""
+        paint = PAINTS[part.paint]
+        red, green, blue, *own = _taken(rest, paint.parameters) if part.adds else BLACK
+        row = _taken(rest, KINDS[part.kind].parameters)
+        return cls(part.kind, row, (red, green, blue), part.paint, tuple(own))
 
-    def painted(self) -> dict[str, float | tuple[float, ...]]:
+    def named(self) -> dict[str, Value]:
+        """The kind's parameters by name: a float, or a tuple for those of several components."""
+        return named(KINDS[self.kind].parameters, self.parameters)
+
+    def painted(self) -> dict[str, Value]:
         """The paint's parameters by name, `color` first."""
-        return {"color": self.color, **_named(PAINTS[self.paint].own, self.paint_parameters)}
+        return named(PAINTS[self.paint].parameters, (*self.color, *self.paint_parameters))
+
+
+def _taken(rest: Iterator[float], parameters: Iterable[Parameter]) -> tuple[float, ...]:
+    """The numbers of some parameters, which come next in a row."""
+    return tuple(islice(rest, sum(parameter.width for parameter in parameters)))
+
+
+def _checked_row(
+    parameters: tuple[Parameter, ...], row: Sequence[float], path: str, owner: str
+) -> tuple[float, ...]:
+    """A flat row of numbers, rounded. Raises SceneError for a wrong number of them, or one out of range."""
+    count = sum(parameter.width for parameter in parameters)
+    if len(row) != count:
+        raise SceneError(path, f"{owner} has {count} numbers, got {len(row)}")
+    return numbers_of(parameters, named(parameters, row)) if parameters else ()
 
     @property
     def colors(self) -> tuple[Color, ...]:
@@ -195,21 +251,17 @@ class Layer:
     joints: tuple[Joint, ...] = ()
 
     def __post_init__(self) -> None:
-        if not self.shapes:
-            raise SceneError("shapes", "must hold at least 1 shape, got 0")
-        if len(self.shapes) > MAX_JOINED:
-            raise SceneError("shapes", f"at most {MAX_JOINED} shapes, got {len(self.shapes)}")
+        with within("shapes"):
+            checked(Joined, self.shapes)
         if len(self.joints) != len(self.shapes) - 1:
-            raise SceneError(
-                "joints", f"one fewer than shapes ({len(self.shapes) - 1}), got {len(self.joints)}"
-            )
+            raise SceneError("joints", f"must be {len(self.shapes) - 1}, got {len(self.joints)}")
         patches = [shape.kind for shape in self.shapes if KINDS[shape.kind].patch is not None]
         if patches and self.joints:
             raise SceneError("shapes", f"a {patches[0]} can't be joined with others")
-        falloff = _between(self.falloff, "falloff", 0.0, LONGEST_CANVAS)
+        opacity, falloff = numbers_of(LOOK, {"opacity": self.opacity, "falloff": self.falloff})
         object.__setattr__(self, "falloff", 0.0 if patches else falloff)
-        object.__setattr__(self, "opacity", _between(self.opacity, "opacity", -1.0, 1.0, COLOR_DECIMALS))
-        joints = tuple(_numbered(list(self.joints), "shapes", _joint, first=1))
+        object.__setattr__(self, "opacity", opacity)
+        joints = tuple(_joint(index, *joint) for index, joint in enumerate(self.joints, 1))
         object.__setattr__(self, "joints", joints)
         object.__setattr__(self, "shapes", (self.shapes[0], *map(_unpainted, self.shapes[1:], joints)))
 
@@ -245,9 +297,9 @@ class Layer:
     def numbers(self) -> list[float]:
         """Its row: see `layer.slots`."""
         row = [self.opacity, self.falloff]
-        for index, shape in enumerate(self.shapes):
-            row += [self.joints[index - 1].smoothness] if index else []
-            row += [*shape.color, *shape.paint_parameters] if self.structure[index].adds else []
+        for shape, joint in zip(self.shapes, (None, *self.joints), strict=True):
+            row += [joint.smoothness] if joint else []
+            row += [*shape.color, *shape.paint_parameters] if not joint or JOINS[joint.join].adds else []
             row += shape.parameters
         return row
 
@@ -255,18 +307,11 @@ class Layer:
     def from_numbers(cls, structure: Structure, numbers: Sequence[float]) -> Layer:
         """The layer of a row."""
         rest = iter(numbers)
-
-        def take(parameters: Sequence[Parameter]) -> tuple[float, ...]:
-            return tuple(next(rest) for parameter in parameters for _ in range(parameter.width))
-
         opacity, falloff = next(rest), next(rest)
         shapes, joints = [], []
         for part in structure:
             joints += [Joint(part.join, next(rest))] if part.join else []
-            red, green, blue = take((BASE,)) if part.adds else BLACK
-            own = take(PAINTS[part.paint].own)
-            shape = take(KINDS[part.kind].parameters)
-            shapes.append(Shape(part.kind, shape, (red, green, blue), part.paint, own))
+            shapes.append(Shape.from_numbers(part, rest))
         return cls(tuple(shapes), falloff, opacity, tuple(joints))
 
 
@@ -275,9 +320,9 @@ def _unpainted(shape: Shape, joint: Joint) -> Shape:
     return shape if JOINS[joint.join].adds else Shape(shape.kind, shape.parameters)
 
 
-def _joint(joint: tuple[str, float]) -> Joint:
-    join, smoothness = joint
-    return Joint(_one_of(join, "join", JOINS), _between(smoothness, "smoothness", 0.0, LONGEST_CANVAS))
+def _joint(index: int, join: str, smoothness: float) -> Joint:
+    with within(f"shapes[{index}]"):
+        return Joint(one_of(join, "join", JOINS), *numbers_of((JOIN,), {JOIN.name: smoothness}))
 
 
 @dataclass(frozen=True)
@@ -292,22 +337,21 @@ class Scene:
     width: int
     height: int
     layers: tuple[Layer, ...]
-    background: Color | None = (0.0, 0.0, 0.0)
+    background: Color | None = BLACK
     compositing: str = OVER
 
     def __post_init__(self) -> None:
-        _whole(self.width, "width", 1, MAX_SIDE)
-        _whole(self.height, "height", 1, MAX_SIDE)
-        _one_of(self.compositing, "compositing", COMPOSITING)
+        for name in ("width", "height"):
+            with within(name):
+                checked(Side, getattr(self, name))
+        one_of(self.compositing, "compositing", COMPOSITING)
         if self.background is not None:
-            background = _color(self.background, "background")
-            _check_color(background, "background", 0.0)
-            object.__setattr__(self, "background", background)
+            object.__setattr__(self, "background", numbers_of((GROUND,), {GROUND.name: self.background}))
         if self.shape_count > MAX_SHAPES:
             raise SceneError("layers", f"at most {MAX_SHAPES} shapes, got {self.shape_count}")
-        lowest = COMPOSITING[self.compositing].lowest
-        for index, layer in enumerate(self.layers):
-            _check_layer_colors(layer, f"layers[{index}]", lowest)
+        if not COMPOSITING[self.compositing].signed:
+            for index, layer in enumerate(self.layers):
+                _refuse_signs(layer, f"layers[{index}]")
 
     @property
     def shape_count(self) -> int:
@@ -320,280 +364,15 @@ class Scene:
         return self.width / shortest, self.height / shortest
 
 
-def _check_color(color: Color, path: str, lowest: float) -> None:
-    for index, value in enumerate(color):
-        if not lowest <= value <= 1.0:
-            raise SceneError(f"{path}[{index}]", f"must be between {lowest:g} and 1, got {value:g}")
-
-
-def _check_layer_colors(layer: Layer, path: str, lowest: float) -> None:
-    if layer.opacity < lowest:
-        raise SceneError(f"{path}.opacity", f"must be between {lowest:g} and 1, got {layer.opacity:g}")
+def _refuse_signs(layer: Layer, path: str) -> None:
+    """Raises SceneError for an opacity or a colour below 0."""
+    if layer.opacity < 0.0:
+        raise SceneError(f"{path}.opacity", f"must be >= 0, got {layer.opacity:g}")
     for index, shape in enumerate(layer.shapes):
         inner = f"{path}.shapes[{index}]" if layer.joints else path
-        for name, value in shape.painted().items():
-            if isinstance(value, tuple) and len(value) == 3:
-                _check_color(value, f"{inner}.{name}", lowest)
-
-
-def _one_of(value: Any, path: str, known: Mapping[str, Any]) -> str:
-    if not isinstance(value, str) or value not in known:
-        raise SceneError(path, f"must be one of {_listed(known)}, got {_shown(value)}")
-    return value
-
-
-def _kind(name: Any) -> Kind:
-    return KINDS[_one_of(name, "kind", KINDS)]
-
-
-def _listed(names: Mapping[str, Any] | Sequence[str]) -> str:
-    return ", ".join(names)
-
-
-def _paint(name: Any) -> Paint:
-    return PAINTS[_one_of(name, "paint", PAINTS)]
-
-
-def _checked(
-    row: Sequence[float], parameters: Sequence[Parameter], path: str, owner: str
-) -> tuple[float, ...]:
-    """A flat row of numbers, rounded. Raises SceneError for a wrong number of them, or one out of range."""
-    declared = [
-        (parameter, f"{parameter.name}[{i}]" if parameter.width > 1 else parameter.name)
-        for parameter in parameters
-        for i in range(parameter.width)
-    ]
-    if len(row) != len(declared):
-        raise SceneError(path, f"{owner} has {len(declared)} numbers, got {len(row)}")
-    values = []
-    for value, (parameter, name) in zip(row, declared, strict=True):
-        values.append(_number(value, name, parameter.unit.decimals))
-        _in_range(parameter, values[-1], name)
-    return tuple(values)
-
-
-def _named(parameters: Sequence[Parameter], row: Sequence[float]) -> dict[str, float | tuple[float, ...]]:
-    rest = iter(row)
-    return {p.name: p.values_from([next(rest) for _ in range(p.width)]) for p in parameters}
-
-
-def _flatten(parameters: Sequence[Parameter], values: Mapping[str, Any], owner: str) -> tuple[float, ...]:
-    flat: list[float] = []
-    names = [parameter.name for parameter in parameters]
-    for parameter in parameters:
-        if parameter.name not in values:
-            raise SceneError(parameter.name, f"missing; {owner} has {_listed(names)}")
-        value = values[parameter.name]
-        if parameter.width == 1:
-            flat.append(value)
-        elif isinstance(value, (list, tuple)) and len(value) == parameter.width:
-            flat.extend(value)
-        else:
-            raise SceneError(
-                parameter.name, f"must be a list of {parameter.width} numbers, got {_shown(value)}"
-            )
-    for name in values:
-        if name not in names:
-            raise SceneError(_field(name), f"unknown; {owner} has {_listed(names)}")
-    return tuple(flat)
-
-
-# --- writing -----------------------------------------------------------------------------------------------
-
-
-def dumps(scene: Scene) -> str:
-    """The scene as JSON text, one line a layer."""
-    head = {
-        "format": FORMAT,
-        "version": VERSION,
-        "width": scene.width,
-        "height": scene.height,
-        "compositing": scene.compositing,
-        "background": scene.background,
-    }
-    lines = [f"  {json.dumps(key)}: {_json(value)}" for key, value in head.items()]
-    layers = ",\n".join(f"    {_json(_layer_object(layer))}" for layer in scene.layers)
-    lines.append(f'  "layers": [\n{layers}\n  ]' if layers else '  "layers": []')
-    return "{\n" + ",\n".join(lines) + "\n}\n"
-
-
-def save(scene: Scene, path: str | os.PathLike[str]) -> None:
-    """Writes the scene as JSON. Raises Sdf2vecError when the file can't be written."""
-    write_atomically(path, dumps(scene).encode())
-
-
-def _layer_object(layer: Layer) -> dict[str, Any]:
-    rest: dict[str, Any] = {}
-    if not layer.is_patch:
-        rest["falloff"] = layer.falloff
-    if layer.opacity != 1.0:
-        rest["opacity"] = layer.opacity
-    if not layer.joints:
-        return _shape_object(layer.shapes[0]) | rest
-    first, *others = layer.shapes
-    joined = [
-        joint._asdict() | _shape_object(shape, JOINS[joint.join].adds)
-        for joint, shape in zip(layer.joints, others, strict=True)
-    ]
-    return {"shapes": [_shape_object(first), *joined]} | rest
-
-
-def _shape_object(shape: Shape, painted: bool = True) -> dict[str, Any]:
-    paint = {"paint": shape.paint} if painted and shape.paint != FLAT else {}
-    return {"kind": shape.kind, **shape.named(), **paint, **(shape.painted() if painted else {})}
-
-
-def _json(value: Any) -> str:
-    return json.dumps(_short(value), ensure_ascii=False)
-
-
-def _short(value: Any) -> Any:
-    """Whole floats as integers, tuples as lists."""
-    if isinstance(value, float):
-        return int(value) if value.is_integer() else value
-    if isinstance(value, dict):
-        return {key: _short(item) for key, item in value.items()}
-    return [_short(item) for item in value] if isinstance(value, (list, tuple)) else value
-
-
-# --- reading -----------------------------------------------------------------------------------------------
-
-
-def loads(text: str | bytes) -> Scene:
-    """A scene from JSON text. Raises SceneError, whose one line names the offending field."""
-    data = _object(_parse(text))
-    if data.get("format") != FORMAT:
-        raise SceneError("format", f"must be {FORMAT!r}, got {_shown(data.get('format'))}; not a scene file")
-    version = data.get("version")
-    if version not in (1, VERSION) or isinstance(version, bool):
-        raise SceneError("version", f"this program reads versions 1 to {VERSION}, got {_shown(version)}")
-    known = {"format", "version", "width", "height", "compositing", "background", "layers"}
-    _refuse_unknown(data, known)
-    layers = _required(data, "layers")
-    if not isinstance(layers, list):
-        raise SceneError("layers", f"must be a list, got {_shown(layers)}")
-    if len(layers) > MAX_SHAPES:
-        raise SceneError("layers", f"at most {MAX_SHAPES} shapes, got {len(layers)}")
-    return Scene(
-        width=_required(data, "width"),
-        height=_required(data, "height"),
-        layers=tuple(_numbered(layers, "layers", _read_first_version if version == 1 else _read_layer)),
-        background=_required(data, "background"),
-        compositing=_required(data, "compositing"),
-    )
-
-
-def load(path: str | os.PathLike[str]) -> Scene:
-    """A scene from a JSON file. Raises Sdf2vecError, whose one line names the file and the field."""
-    try:
-        text = Path(path).read_bytes()
-    except (OSError, ValueError) as error:  # ValueError: a NUL character in the path
-        reason = getattr(error, "strerror", None) or error
-        raise Sdf2vecError(f"{one_line(str(path))}: cannot read the scene ({reason})") from None
-    try:
-        return loads(text)
-    except SceneError as error:
-        raise Sdf2vecError(f"{one_line(str(path))}: {error}") from None
-
-
-def _parse(text: str | bytes) -> Any:
-    try:
-        return json.loads(text, parse_int=_integer, object_pairs_hook=_Object)
-    except json.JSONDecodeError as error:
-        raise SceneError(
-            "", f"not valid JSON: {error.msg} at line {error.lineno}, column {error.colno}"
-        ) from None
-    except UnicodeDecodeError:
-        raise SceneError("", "not valid JSON: not UTF-8 text") from None
-    except RecursionError:
-        raise SceneError("", "not a scene: nested too deeply") from None
-
-
-class _Object(dict[str, Any]):
-    """A JSON object that knows which of its fields, if any, appeared more than once."""
-
-    def __init__(self, pairs: list[tuple[str, Any]]) -> None:
-        super().__init__(pairs)
-        self.repeated: str | None = None
-        if len(self) < len(pairs):
-            self.repeated = Counter(name for name, _ in pairs).most_common(1)[0][0]
-
-
-def _integer(digits: str) -> int | float:
-    """Python refuses to read thousands of digits; the field's own check then refuses infinity."""
-    return int(digits) if len(digits) <= 400 else math.copysign(math.inf, -1 if digits[0] == "-" else 1)
-
-
-def _numbered(items: list[Any], path: str, read: Callable[[Any], Any], first: int = 0) -> Iterator[Any]:
-    for index, item in enumerate(items, first):
-        with _within(f"{path}[{index}]"):
-            yield read(item)
-
-
-def _object(value: Any) -> _Object:
-    if not isinstance(value, _Object):
-        raise SceneError("", f"must be an object, got {_shown(value)}")
-    if value.repeated is not None:
-        raise SceneError(_field(value.repeated), "appears twice in one object")
-    return value
-
-
-def _required(data: dict[str, Any], name: str) -> Any:
-    if name not in data:
-        raise SceneError(name, "missing")
-    return data[name]
-
-
-def _refuse_unknown(data: dict[str, Any], known: set[str]) -> None:
-    for name in data:
-        if name not in known:
-            raise SceneError(_field(name), f"unknown field; known are {_listed(sorted(known))}")
-
-
-def _read_layer(value: Any) -> Layer:
-    data = _object(value)
-    opacity = data.get("opacity", 1.0)
-    if "shapes" not in data:
-        shape = _read_shape({k: v for k, v in data.items() if k not in ("falloff", "opacity")})
-        return Layer((shape,), _falloff(data, shape), opacity)
-    _refuse_unknown(data, {"shapes", "falloff", "opacity"})
-    if not isinstance(data["shapes"], list):
-        raise SceneError("shapes", f"must be a list, got {_shown(data['shapes'])}")
-    read = list(_numbered(data["shapes"], "shapes", _read_joined))
-    if read and read[0][1] is not None:
-        raise SceneError("shapes[0].join", "the first shape is joined to nothing")
-    joints = tuple(joint or Joint() for _, joint in read[1:])
-    return Layer(tuple(shape for shape, _ in read), _required(data, "falloff"), opacity, joints)
-
-
-def _falloff(data: dict[str, Any], shape: Shape) -> Any:
-    return data.get("falloff", 0.0) if KINDS[shape.kind].patch is not None else _required(data, "falloff")
-
-
-def _read_joined(value: Any) -> tuple[Shape, Joint | None]:
-    data = dict(_object(value))
-    if "join" not in data and "smoothness" not in data:
-        return _read_shape(data), None
-    joint = _joint((_required(data, "join"), data.pop("smoothness", 0.0)))
-    return _read_shape({k: v for k, v in data.items() if k != "join"}, joint.join), joint
-
-
-def _read_shape(data: dict[str, Any], join: str = "") -> Shape:
-    kind, paint = _kind(_required(data, "kind")), data.get("paint", FLAT)
-    color = data.get("color", BLACK) if join and not JOINS[join].adds else _required(data, "color")
-    values = {name: item for name, item in data.items() if name not in ("kind", "color", "paint")}
-    return Shape.of(kind.name, color, paint, **values)
-
-
-def _read_first_version(value: Any) -> Layer:
-    """A layer of version 1: one shape, or a union of one smoothness."""
-    data = _object(value)
-    if "union" not in data:
-        data.pop("smoothness", None)
-        return _read_layer(data)
-    _refuse_unknown(data, {"union", "falloff", "opacity", "smoothness"})
-    if not isinstance(data["union"], list):
-        raise SceneError("union", f"must be a list, got {_shown(data['union'])}")
-    shapes = list(_numbered(data["union"], "union", lambda item: _read_shape(_object(item))))
-    smoothness = _required(data, "smoothness") if len(shapes) > 1 else 0.0
-    return Layer.union(shapes, smoothness, _required(data, "falloff"), data.get("opacity", 1.0))
+        rest = iter((*shape.color, *shape.paint_parameters))
+        for parameter in PAINTS[shape.paint].parameters:
+            numbers = _taken(rest, (parameter,))
+            if parameter.unit is COLOR and min(numbers) < 0.0:
+                place = f"{inner}.{parameter.name}[{numbers.index(min(numbers))}]"
+                raise SceneError(place, f"must be >= 0, got {min(numbers):g}")

@@ -59,7 +59,7 @@ class Codec:
     power: int = 1
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Unit:
     """What a number is.
 
@@ -293,4 +293,12 @@ SMOOTHNESS = Unit(
     scaling=1,
     crowded=True,
 )
-BACKGROUND = Unit("background", 0.0, 1.0, 0.01, _keep_within(0.0, 1.0), Codec(_between("color"), "color"))
+BACKGROUND = Unit(
+    "background",
+    0.0,
+    1.0,
+    0.01,
+    _keep_within(0.0, 1.0),
+    Codec(_between("color"), "color"),
+    decimals=COLOR_DECIMALS,
+)

@@ -12,7 +12,7 @@ from sdf2vec.engines.pages import ELEMENT
 from sdf2vec.expr import scalarize, var
 from sdf2vec.lower.javascript import function_text
 from sdf2vec.render import reference
-from sdf2vec.scene import dumps
+from sdf2vec.scene_file import dumps
 
 from .operations import MEANINGS, expected
 from .scenes import random_scene

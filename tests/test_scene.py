@@ -2,6 +2,7 @@
 
 import json
 import math
+from itertools import product
 
 import numpy as np
 import pytest
@@ -9,55 +10,79 @@ import torch
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
-import sdf2vec
-from sdf2vec import KINDS, Layer, Scene, SceneError, Sdf2vecError, Shape, dumps, load, loads, save
+from sdf2vec import (
+    KINDS,
+    Joint,
+    Layer,
+    Scene,
+    SceneError,
+    Sdf2vecError,
+    Shape,
+    dumps,
+    export,
+    load,
+    loads,
+    save,
+)
+from sdf2vec.blend import COMPOSITING, JOINS
+from sdf2vec.layer import Part, row_width
+from sdf2vec.paints import PAINTS, Paint
 from sdf2vec.render.reference import render
-from sdf2vec.scene import MAX_SHAPES, MAX_SIDE, MAX_UNION
+from sdf2vec.scene import MAX_JOINED, MAX_SHAPES
+from sdf2vec.shapes import Kind
+from sdf2vec.units import COLOR, DIRECTION, LENGTH, OPACITY, POSITION, Parameter
+
+from .scenes import PATCHES, SOFT, random_scene
 
 # --- random scenes -----------------------------------------------------------------------------------------
 
 
-def numbers(low, high, exclude_min=False):
-    return st.floats(low, high, exclude_min=exclude_min, allow_nan=False)
+def numbers(low, high):
+    return st.floats(low, high, allow_nan=False)
 
 
-def scalars_of(kind):
-    """A strategy for each float of a shape of this kind; what must be > 0 stays so when it is rounded."""
-    return [
-        numbers(1e-5 if parameter.positive else parameter.minimum, parameter.maximum)
-        for parameter in KINDS[kind].parameters
-        for _ in parameter.start
-    ]
+def rows(parameters, lowest):
+    """A strategy for the flat row of some parameters; what must be > 0 stays so when it is rounded."""
+    scalars = []
+    for parameter in parameters:
+        low = 1e-5 if parameter.positive else parameter.unit.low
+        scalars += [
+            numbers(lowest if parameter.unit is COLOR else low, parameter.unit.high)
+        ] * parameter.width
+    return st.tuples(*scalars)
 
 
-def shapes(kind, lowest):
-    color = st.tuples(*[numbers(lowest, 1.0)] * 3)
-    return st.builds(Shape, st.just(kind), st.tuples(*scalars_of(kind)), color)
+def shapes(kinds, lowest):
+    def of(names):
+        kind, paint = names
+        row = rows(KINDS[kind].parameters, lowest)
+        own = rows(PAINTS[paint].own, lowest)
+        color = st.tuples(*[numbers(lowest, 1.0)] * 3)
+        return st.builds(Shape, st.just(kind), row, color, st.just(paint), own)
+
+    return st.tuples(st.sampled_from(sorted(kinds)), st.sampled_from(sorted(PAINTS))).flatmap(of)
 
 
 def layers(lowest):
-    length = numbers(0.0, 64.0)
-    opacity = st.one_of(st.just(1.0), numbers(lowest, 1.0))
+    look = numbers(0.0, 64.0), st.one_of(st.just(1.0), numbers(lowest, 1.0))
+    joint = st.builds(Joint, st.sampled_from(sorted(JOINS)), st.just(0.0) | numbers(0.0, 64.0))
 
-    def of_kind(kind):
-        one = st.tuples(shapes(kind, lowest))
-        several = st.lists(shapes(kind, lowest), min_size=2, max_size=4).map(tuple)
-        return st.one_of(
-            st.builds(Layer, one, length, opacity),
-            st.builds(Layer, several, length, opacity, numbers(1e-5, 64.0)),
-        )
+    def joined(several):
+        joints = st.tuples(*[joint] * (len(several) - 1))
+        return st.builds(Layer, st.just(tuple(several)), *look, joints)
 
-    return st.sampled_from(sorted(KINDS)).flatmap(of_kind)
+    one = st.builds(Layer, st.tuples(shapes(KINDS, lowest)), *look)
+    return one | st.lists(shapes(SOFT, lowest), min_size=2, max_size=4).flatmap(joined)
 
 
 def scenes_of(compositing):
-    side = st.integers(1, MAX_SIDE)
-    drawn = st.lists(layers(-1.0 if compositing == "additive" else 0.0), max_size=5).map(tuple)
+    side = st.integers(1, 65536)
+    drawn = st.lists(layers(COMPOSITING[compositing].lowest), max_size=5).map(tuple)
     background = st.none() | st.tuples(*[numbers(0.0, 1.0)] * 3)
     return st.builds(Scene, side, side, drawn, background, st.just(compositing))
 
 
-scenes = st.sampled_from(["over", "additive"]).flatmap(scenes_of)
+scenes = st.sampled_from(sorted(COMPOSITING)).flatmap(scenes_of)
 
 
 @given(scenes)
@@ -69,6 +94,23 @@ def test_what_is_written_comes_back(scene):
     assert dumps(loads(text)) == text
 
 
+@pytest.mark.parametrize("compositing", COMPOSITING)
+@pytest.mark.parametrize("paint", PAINTS)
+def test_every_kind_paint_and_join_comes_back(paint, compositing):
+    alone = [random_scene((kind,), compositing, 1, paints=(paint,)).layers[0] for kind in KINDS]
+    for layer in alone:
+        assert layer.structure == (Part(layer.shapes[0].kind, paint),)
+    joined = [
+        Layer((first.shapes[0], second.shapes[0]), 0.1, 0.5, (Joint(join, smoothness),))
+        for first, second in product(alone, alone)
+        for join in JOINS
+        for smoothness in (0.0, 0.125)
+        if {first.shapes[0].kind, second.shapes[0].kind} <= set(SOFT)
+    ]
+    scene = Scene(30, 20, (*alone, *joined), None, compositing)
+    assert loads(dumps(scene)) == scene
+
+
 @given(scenes)
 @settings(max_examples=30, deadline=None)
 def test_text_has_one_line_a_layer_in_draw_order(scene):
@@ -76,11 +118,16 @@ def test_text_has_one_line_a_layer_in_draw_order(scene):
     assert len(lines) == 9 + (len(scene.layers) + 1 if scene.layers else 0)
     for layer, line in zip(scene.layers, lines[8:-2] if scene.layers else [], strict=True):
         item = json.loads(line.rstrip(","))
-        first = item["union"][0] if len(layer.shapes) > 1 else item
-        assert first["kind"] == layer.kind
-        assert item["falloff"] == layer.falloff
-        named = layer.shapes[0].named().items()
-        assert {name: list(v) if isinstance(v, tuple) else v for name, v in named}.items() <= first.items()
+        assert item.get("falloff", 0) == layer.falloff
+        assert item.get("opacity", 1) == layer.opacity
+        for index, (shape, told) in enumerate(zip(layer.shapes, item.get("shapes", [item]), strict=True)):
+            assert (told["kind"], told.get("paint", "flat")) == (shape.kind, shape.paint)
+            joint = layer.joints[index - 1] if index else Joint()
+            assert (told.get("join", "union"), told.get("smoothness", 0)) == joint
+            painted = shape.painted() if JOINS[joint.join].adds else {}
+            values = {n: list(v) if isinstance(v, tuple) else v for n, v in (shape.named() | painted).items()}
+            words = {"kind", "paint", "join", "smoothness", "falloff", "opacity"}
+            assert {name: told[name] for name in told if name not in words} == values
 
 
 def test_text_is_what_a_person_would_write():
@@ -89,27 +136,62 @@ def test_text_is_what_a_person_would_write():
         (
             Shape.of("circle", (0, 1, 0), center=(0, 0.5), radius=1 / 3),
             Shape.of("circle", (0, 0, 1), center=(-0.0, 0.5), radius=2),
+            Shape.of("ellipse", center=(0, 1), radii=(0.25, 0.5), angle=0),
         ),
-        falloff=0,
         opacity=0.5,
-        smoothness=0.1,
+        joints=(Joint("union", 0.1), Joint("subtraction")),
     )
-    assert dumps(Scene(300, 200, (sun, hills), background=None)) == (
+    sky = Shape.of(
+        "gaussian",
+        (0, 0, 1),
+        "linear",
+        color_end=(1, 1, 1),
+        direction=(0, 0.5),
+        center=(0, 0),
+        radii=(1, 2),
+        angle=0,
+    )
+    assert dumps(Scene(300, 200, (sun, hills, Layer((sky,))), background=None)) == (
         "{\n"
         '  "format": "sdf2vec scene",\n'
-        '  "version": 1,\n'
+        '  "version": 2,\n'
         '  "width": 300,\n'
         '  "height": 200,\n'
         '  "compositing": "over",\n'
         '  "background": null,\n'
         '  "layers": [\n'
-        '    {"kind": "circle", "center": [0.25, -0.1], "radius": 0.2, "color": [1, 0.5, 0], "falloff": 0.05},\n'
-        '    {"union": [{"kind": "circle", "center": [0, 0.5], "radius": 0.333333, "color": [0, 1, 0]}, '
-        '{"kind": "circle", "center": [0, 0.5], "radius": 2, "color": [0, 0, 1]}], '
-        '"smoothness": 0.1, "falloff": 0, "opacity": 0.5}\n'
+        '    {"kind": "circle", "color": [1, 0.5, 0], "center": [0.25, -0.1], "radius": 0.2, "falloff": 0.05},\n'
+        '    {"shapes": [{"kind": "circle", "color": [0, 1, 0], "center": [0, 0.5], "radius": 0.333333}, '
+        '{"kind": "circle", "smoothness": 0.1, "color": [0, 0, 1], "center": [0, 0.5], "radius": 2}, '
+        '{"join": "subtraction", "kind": "ellipse", "center": [0, 1], "radii": [0.25, 0.5], "angle": 0}], '
+        '"opacity": 0.5},\n'
+        '    {"kind": "gaussian", "paint": "linear", "color": [0, 0, 1], "color_end": [1, 1, 1], '
+        '"direction": [0, 0.5], "center": [0, 0], "radii": [1, 2], "angle": 0}\n'
         "  ]\n"
         "}\n"
     )
+
+
+def test_the_first_version_is_read():
+    circle = '{"kind": "circle", "center": [0.5, 0], "radius": 0.25, "color": [1, 0, 0]'
+    text = (
+        '{"format": "sdf2vec scene", "version": 1, "width": 30, "height": 20, "compositing": "additive",'
+        ' "background": [0, 0.5, 1], "layers": ['
+        f'{circle}, "falloff": 0.125, "opacity": -0.5}}, '
+        f'{{"union": [{circle}}}, {circle}}}, {circle}}}], "smoothness": 0.75, "falloff": 0.125}}]}}'
+    )
+    shape = Shape("circle", (0.5, 0.0, 0.25), (1.0, 0.0, 0.0))
+    joints = (Joint("union", 0.75), Joint("union", 0.75))
+    layers = (Layer((shape,), 0.125, -0.5), Layer((shape,) * 3, 0.125, 1.0, joints))
+    assert loads(text) == Scene(30, 20, layers, (0.0, 0.5, 1.0), "additive")
+    assert loads(dumps(loads(text))) == loads(text)
+    assert refusal(text.replace("0.25", "0")) == "layers[0].radius: must be > 0, got 0"
+    assert (
+        refusal(text.replace("}]", ', "radius": 1}]'))
+        == "layers[1].union[2].radius: appears twice in one object"
+    )
+    assert refusal(text.replace("0.75", "-1")) == "layers[1].smoothness: must be >= 0, got -1"
+    assert refusal(text.replace('"version": 1', '"version": 2')).startswith("layers[1].kind: must be one of")
 
 
 def test_no_layers():
@@ -136,7 +218,7 @@ def test_unreadable_files_are_named_in_one_line(tmp_path, name):
 def test_malformed_file_is_named_with_the_field(tmp_path):
     path = tmp_path / "bad.scene.json"
     path.write_text(dumps(Scene(3, 2, ())).replace('"width": 3', '"width": -3'))
-    with pytest.raises(Sdf2vecError, match=r"bad\.scene\.json: width: must be between 1 and 65536, got -3$"):
+    with pytest.raises(Sdf2vecError, match=r"bad\.scene\.json: width: must be >= 1, got -3$"):
         load(path)
 
 
@@ -164,25 +246,37 @@ def test_rounding_costs_no_visible_quality():
 # --- refusals ----------------------------------------------------------------------------------------------
 
 CIRCLE = {"kind": "circle", "center": [0, 0], "radius": 0.5, "color": [1, 0.5, 0], "falloff": 0.1}
-BLOB = {key: value for key, value in CIRCLE.items() if key != "falloff"}
 BOX = {
     "kind": "box",
     "center": [0, 0],
     "half_size": [0.5, 0.25],
     "angle": 0,
     "corner_radius": 0,
+    "paint": "linear",
     "color": [1, 0, 0],
-    "falloff": 0,
+    "color_end": [0, 0, 1],
+    "direction": [0.5, 0],
 }
-UNION = {"union": [BLOB, BLOB, BLOB], "smoothness": 0.1, "falloff": 0.1, "opacity": 0.5}
+BLOB = {key: value for key, value in CIRCLE.items() if key != "falloff"}
+HOLE = {"join": "subtraction", "smoothness": 0.1, "kind": "circle", "center": [0, 0], "radius": 0.5}
+JOINED = {"shapes": [BLOB, BOX | {"join": "union"}, HOLE], "falloff": 0.1, "opacity": 0.5}
+PATCH = {
+    "kind": "gabor",
+    "center": [0, 0],
+    "radii": [0.5, 0.25],
+    "angle": 0,
+    "frequency": 20,
+    "phase": 0,
+    "color": [1, 1, 1],
+}
 VALID = {
     "format": "sdf2vec scene",
-    "version": 1,
+    "version": 2,
     "width": 40,
     "height": 30,
     "compositing": "over",
     "background": [0, 0, 0],
-    "layers": [CIRCLE, BOX, UNION],
+    "layers": [CIRCLE, BOX, JOINED, PATCH],
 }
 ABSENT = object()
 
@@ -222,10 +316,13 @@ NUMBERS = [
     ("layers", 0, "color", 2),
     ("layers", 0, "falloff"),
     ("layers", 1, "half_size", 0),
-    ("layers", 2, "union", 1, "radius"),
-    ("layers", 2, "union", 1, "color", 0),
-    ("layers", 2, "smoothness"),
+    ("layers", 1, "color_end", 0),
+    ("layers", 2, "shapes", 1, "angle"),
+    ("layers", 2, "shapes", 1, "color", 0),
+    ("layers", 2, "shapes", 2, "radius"),
+    ("layers", 2, "shapes", 2, "smoothness"),
     ("layers", 2, "opacity"),
+    ("layers", 3, "frequency"),
     ("background", 1),
 ]
 NO_NUMBERS = {
@@ -242,7 +339,7 @@ NO_NUMBERS = {
 
 
 def test_the_valid_scene_is_valid():
-    assert loads(json.dumps(VALID)).shape_count == 5
+    assert loads(json.dumps(VALID)).shape_count == 6
 
 
 @pytest.mark.parametrize("path", NUMBERS, ids=spelled)
@@ -263,50 +360,75 @@ def test_numbers_too_large_for_any_machine(literal):
     [
         (("layers", 0, "radius"), -3, "must be > 0, got -3"),
         (("layers", 0, "radius"), 0, "must be > 0, got 0"),
+        (("layers", 0, "radius"), 1e-9, "must be > 0, got 0"),
         (("layers", 0, "radius"), 1e9, "must be <= 65536, got 1e+09"),
         (("layers", 0, "center", 1), -1e9, "must be >= -65536, got -1e+09"),
         (("layers", 1, "corner_radius"), -0.1, "must be >= 0, got -0.1"),
-        (("layers", 0, "falloff"), -1, "must be between 0 and 65536, got -1"),
-        (("layers", 0, "color", 0), 1.1, "must be between 0 and 1, got 1.1"),
-        (("layers", 0, "color", 2), -0.1, "must be between 0 and 1, got -0.1"),
-        (("layers", 2, "union", 1, "color", 0), 7, "must be between 0 and 1, got 7"),
-        (("layers", 2, "union", 2, "radius"), -1, "must be > 0, got -1"),
-        (("layers", 2, "smoothness"), 0, "must be > 0, got 0"),
-        (("layers", 2, "smoothness"), -1, "must be between 0 and 65536, got -1"),
-        (("layers", 2, "opacity"), 1.5, "must be between -1 and 1, got 1.5"),
-        (("layers", 2, "opacity"), -0.5, "must be between 0 and 1, got -0.5"),
-        (("background", 0), -0.5, "must be between 0 and 1, got -0.5"),
-        (("width",), 0, "must be between 1 and 65536, got 0"),
-        (("height",), 65537, "must be between 1 and 65536, got 65537"),
-        (("height",), 40.0, "must be a whole number, got 40.0"),
+        (("layers", 1, "direction", 0), 1001, "must be <= 1000, got 1001"),
+        (("layers", 0, "falloff"), -1, "must be >= 0, got -1"),
+        (("layers", 0, "color", 0), 1.1, "must be <= 1, got 1.1"),
+        (("layers", 0, "color", 2), -0.1, "must be >= 0, got -0.1"),
+        (("layers", 1, "color_end", 1), -0.1, "must be >= 0, got -0.1"),
+        (("layers", 2, "shapes", 1, "color", 0), 7, "must be <= 1, got 7"),
+        (("layers", 2, "shapes", 1, "color_end", 2), -1, "must be >= 0, got -1"),
+        (("layers", 2, "shapes", 2, "radius"), -1, "must be > 0, got -1"),
+        (("layers", 2, "shapes", 2, "smoothness"), -1, "must be >= 0, got -1"),
+        (("layers", 2, "opacity"), 1.5, "must be <= 1, got 1.5"),
+        (("layers", 2, "opacity"), -0.5, "must be >= 0, got -0.5"),
+        (("background", 0), -0.5, "must be >= 0, got -0.5"),
+        (("width",), 0, "must be >= 1, got 0"),
+        (("height",), 65537, "must be <= 65536, got 65537"),
+        (("height",), 40.0, "must be a whole number, got 40"),
         (("height",), True, "must be a whole number, got True"),
-        (("height",), math.nan, "must be a whole number, got nan"),
+        (("height",), math.nan, "must be finite, got nan"),
         (("format",), "other", "must be 'sdf2vec scene', got 'other'; not a scene file"),
-        (("version",), 2, "this program reads version 1, got 2"),
-        (("version",), True, "this program reads version 1, got True"),
-        (("version",), "1", "this program reads version 1, got '1'"),
+        (("version",), 3, "this program reads versions 1 to 2, got 3"),
+        (("version",), True, "this program reads versions 1 to 2, got True"),
+        (("version",), "1", "this program reads versions 1 to 2, got '1'"),
         (("compositing",), "multiply", "must be one of over, additive, got 'multiply'"),
         (("compositing",), [], "must be one of over, additive, got []"),
         (("compositing",), {}, "must be one of over, additive, got {}"),
-        (("background",), "black", "must be a list of 3 numbers, got 'black'"),
-        (("background",), {}, "must be a list of 3 numbers, got {}"),
-        (("background",), False, "must be a list of 3 numbers, got False"),
+        (("background",), "black", "must be a list, got 'black'"),
+        (("background",), {}, "must be a list, got {}"),
+        (("background",), False, "must be a list, got False"),
         (("layers",), {}, "must be a list, got {}"),
         (("layers",), None, "must be a list, got None"),
         (("layers", 0), [], "must be an object, got []"),
         (("layers", 1), None, "must be an object, got None"),
-        (("layers", 2, "union"), {}, "must be a list, got {}"),
-        (("layers", 2, "union"), [], "must hold at least 1 shape, got 0"),
-        (("layers", 2, "union", 1), 5, "must be an object, got 5"),
-        (("layers", 0, "center"), 0.5, "must be a list of 2 numbers, got 0.5"),
-        (("layers", 0, "center"), [1], "must be a list of 2 numbers, got [1]"),
-        (("layers", 0, "center"), [1, 2, 3], "must be a list of 2 numbers, got [1, 2, 3]"),
-        (("layers", 0, "color"), [1, 1], "must be a list of 3 numbers, got [1, 1]"),
+        (("layers", 2, "shapes"), {}, "must be a list, got {}"),
+        (("layers", 2, "shapes"), [], "must be a list of length >= 1, got []"),
+        (("layers", 2, "shapes", 1), 5, "must be an object, got 5"),
+        (("layers", 2, "shapes", 1, "join"), "xor", f"must be one of {', '.join(JOINS)}, got 'xor'"),
+        (("layers", 0, "center"), 0.5, "must be a list, got 0.5"),
+        (("layers", 0, "center"), [1], "must be a list of length 2, got [1]"),
+        (("layers", 0, "center"), [1, 2, 3], "must be a list of length 2, got [1, 2, 3]"),
+        (("layers", 0, "color"), [1, 1], "must be a list of length 3, got [1, 1]"),
         (("layers", 0, "kind"), "star", f"must be one of {', '.join(KINDS)}, got 'star'"),
         (("layers", 0, "kind"), [], f"must be one of {', '.join(KINDS)}, got []"),
-        (("layers", 0, "radii"), 1, "unknown; a circle has center, radius"),
-        (("layers", 0, "smoothness"), 1, "unknown; a circle has center, radius"),
-        (("layers", 2, "color"), 1, "unknown field; known are falloff, opacity, smoothness, union"),
+        (("layers", 1, "paint"), "radial", f"must be one of {', '.join(PAINTS)}, got 'radial'"),
+        (
+            ("layers", 0, "radii"),
+            1,
+            "unknown; known are kind, paint, opacity, falloff, color, center, radius",
+        ),
+        (
+            ("layers", 0, "join"),
+            "union",
+            "unknown; known are kind, paint, opacity, falloff, color, center, radius",
+        ),
+        (
+            ("layers", 2, "shapes", 0, "join"),
+            "union",
+            "unknown; known are kind, paint, color, center, radius",
+        ),
+        (("layers", 2, "shapes", 2, "color"), 1, "unknown; known are kind, join, smoothness, center, radius"),
+        (
+            ("layers", 2, "shapes", 2, "paint"),
+            "linear",
+            "unknown; known are kind, join, smoothness, center, radius",
+        ),
+        (("layers", 2, "color"), 1, "unknown; known are shapes, opacity, falloff"),
+        (("layers", 2, "smoothness"), 1, "unknown; known are shapes, opacity, falloff"),
     ],
     ids=lambda item: spelled(item) if isinstance(item, tuple) else None,
 )
@@ -326,77 +448,136 @@ def test_the_issues_own_example():
         ("background",),
         ("compositing",),
         ("layers",),
-        ("layers", 0, "kind"),
-        ("layers", 0, "falloff"),
         ("layers", 0, "color"),
         ("layers", 0, "radius"),
         ("layers", 1, "angle"),
-        ("layers", 2, "union", 1, "kind"),
-        ("layers", 2, "union", 1, "center"),
+        ("layers", 1, "direction"),
+        ("layers", 2, "shapes", 1, "center"),
+        ("layers", 2, "shapes", 1, "color"),
     ],
     ids=spelled,
 )
 def test_missing_fields(path):
-    assert refusal(changed(path, ABSENT)).startswith(f"{spelled(path)}: missing")
+    assert refusal(changed(path, ABSENT)) == f"{spelled(path)}: missing"
 
 
-def test_a_union_needs_a_smoothness():
-    assert refusal(changed(("layers", 2, "smoothness"), ABSENT)) == "layers[2].smoothness: must be > 0, got 0"
+def test_a_shape_needs_a_kind():
+    problem = f"must be one of {', '.join(KINDS)}, got None"
+    assert (
+        refusal(changed(("layers", 2, "shapes", 1, "kind"), ABSENT)) == f"layers[2].shapes[1].kind: {problem}"
+    )
 
 
-def test_a_union_of_several_kinds():
-    box = {key: value for key, value in BOX.items() if key != "falloff"}
-    text = changed(("layers", 2, "union", 1), box)
-    assert refusal(text) == "layers[2].union: shapes must be of one kind, got circle and box"
+@pytest.mark.parametrize(
+    ("path", "usual"),
+    [
+        (("layers", 0, "falloff"), 0),
+        (("layers", 2, "opacity"), 1),
+        (("layers", 2, "shapes", 1, "join"), "union"),
+        (("layers", 2, "shapes", 2, "smoothness"), 0),
+    ],
+    ids=lambda item: spelled(item) if isinstance(item, tuple) else None,
+)
+def test_what_is_as_usual_may_be_left_out(path, usual):
+    assert loads(changed(path, ABSENT)) == loads(changed(path, usual)) != loads(json.dumps(VALID))
+
+
+@pytest.mark.parametrize("kind", PATCHES)
+def test_patches_are_not_joined(kind):
+    patch = dumps(random_scene((kind,), layers=1)).splitlines()[8]
+    for shapes in ([BLOB, json.loads(patch)], [json.loads(patch), BLOB]):
+        plain = [{k: v for k, v in shape.items() if k not in ("falloff", "opacity")} for shape in shapes]
+        assert refusal(changed(("layers", 2, "shapes"), plain)) == (
+            f"layers[2].shapes: a {kind} can't be joined with others"
+        )
 
 
 def test_additive_scenes_have_signed_colors_and_opacity_but_no_signed_background():
     additive = VALID | {"compositing": "additive"}
-    for path in (("layers", 0, "color", 0), ("layers", 2, "union", 1, "color", 2), ("layers", 2, "opacity")):
+    for path in (
+        ("layers", 0, "color", 0),
+        ("layers", 1, "color_end", 0),
+        ("layers", 2, "shapes", 1, "color", 2),
+        ("layers", 2, "opacity"),
+    ):
         assert loads(changed(path, -1, additive)).compositing == "additive"
-        problem = "must be between -1 and 1, got -1.01"
-        assert refusal(changed(path, -1.01, additive)) == f"{spelled(path)}: {problem}"
+        assert refusal(changed(path, -1.01, additive)) == f"{spelled(path)}: must be >= -1, got -1.01"
     assert refusal(changed(("background", 2), -1, additive)).startswith("background[2]: ")
 
 
 def test_repeated_fields():
     text = json.dumps(VALID)
-    again = text.replace('"radius": 0.5', '"radius": 0.5, "radius": 0.6')
+    again = text.replace('"radius": 0.5', '"radius": 0.5, "radius": 0.6', 1)
     assert refusal(again) == "layers[0].radius: appears twice in one object"
-    in_union = '"union": [{"kind": "circle", "kind": "circle",'
-    assert (
-        refusal(text.replace('"union": [{"kind": "circle",', in_union))
-        == "layers[2].union[0].kind: appears twice in one object"
-    )
+    joined = text.replace('"shapes": [{', '"shapes": [{"kind": "box", ')
+    assert refusal(joined) == "layers[2].shapes[0].kind: appears twice in one object"
     assert refusal(text.replace('"width"', '"height"')) == "height: appears twice in one object"
+
+
+# --- toys --------------------------------------------------------------------------------------------------
+
+
+def test_kinds_and_paints_of_tests_own_are_read(monkeypatch):
+    """What a file may hold is what is registered when it is read."""
+    circle = KINDS["circle"]
+    sizes = tuple(Parameter(f"size_{i}", LENGTH, (1.0,), positive=True) for i in range(9))
+    middle = Parameter("middle", POSITION, (0.0, 0.0))
+    toy = Kind(
+        "toy", (middle, *sizes), circle.distance, circle.extent, circle.area, circle.thickness, exact=False
+    )
+    own = (
+        Parameter("color_far", COLOR, (0.0, 0.0, 0.0)),
+        Parameter("share", OPACITY),
+        Parameter("way", DIRECTION),
+    )
+    shape = {"kind": "toy", "middle": [1, 2], **{p.name: 3 for p in sizes}, "color": [1, 0, 0]}
+    shape |= {"paint": "veil", "color_far": [0, 1, 0], "share": 0.5, "way": 0.25}
+    text = json.dumps(VALID | {"layers": [shape, {"shapes": [BLOB, shape | {"join": "union"}]}]})
+    assert "layers[0].kind: must be one of" in refusal(text)
+    monkeypatch.setitem(KINDS, "toy", toy)
+    assert "layers[0].paint: must be one of" in refusal(text)
+    monkeypatch.setitem(PAINTS, "veil", Paint("veil", PAINTS["flat"].color, own))
+    scene = loads(text)
+    expected = Shape("toy", (1, 2, *[3] * 9), (1, 0, 0), "veil", (0, 1, 0, 0.5, 0.25))
+    assert scene.layers[0].shapes[0] == scene.layers[1].shapes[1] == expected
+    assert loads(dumps(scene)) == scene
+    assert refusal(text.replace('"size_8": 3', '"size_8": 0')) == "layers[0].size_8: must be > 0, got 0"
+    narrower = Kind(
+        "toy", (middle,), circle.distance, circle.extent, circle.area, circle.thickness, exact=False
+    )
+    monkeypatch.setitem(KINDS, "toy", narrower)
+    assert refusal(text).startswith("layers[0].size_0: unknown; known are kind, paint, opacity")
+
+
+# --- files from anywhere -----------------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize("name", ["", "two\nlines", "\x1b[31m", "\ud800", "[0]", "a" * 10**6, "\u2028"])
 def test_strange_names_of_fields(name):
-    assert refusal(json.dumps(VALID | {name: 1})).endswith(
-        "unknown field; known are " + ", ".join(sorted(VALID))
-    )
+    assert refusal(json.dumps(VALID | {name: 1})).endswith("unknown; known are " + ", ".join(VALID))
     assert refusal(changed(("layers", 1, name), 1)).startswith("layers[1].")
 
 
 def test_absurd_counts():
     many = [CIRCLE] * (MAX_SHAPES + 1)
-    assert refusal(json.dumps(VALID | {"layers": many})) == "layers: at most 65536 shapes, got 65537"
-    union = UNION | {"union": [BLOB] * (MAX_UNION + 1)}
-    text = json.dumps(VALID | {"layers": [CIRCLE, union]})
-    assert refusal(text) == f"layers[1].union: at most {MAX_UNION} shapes, got {MAX_UNION + 1}"
-    unions = [UNION | {"union": [BLOB] * MAX_UNION}] * (MAX_SHAPES // MAX_UNION)
-    assert loads(json.dumps(VALID | {"layers": unions})).shape_count == MAX_SHAPES
-    text = json.dumps(VALID | {"layers": [*unions, CIRCLE]})
+    assert refusal(json.dumps(VALID | {"layers": many})).startswith(
+        "layers: must be a list of length <= 65536, got ["
+    )
+    joined = {"shapes": [BLOB] * (MAX_JOINED + 1)}
+    text = json.dumps(VALID | {"layers": [CIRCLE, joined]})
+    assert refusal(text).startswith(f"layers[1].shapes: must be a list of length <= {MAX_JOINED}, got [")
+    full = [{"shapes": [BLOB] * MAX_JOINED}] * (MAX_SHAPES // MAX_JOINED)
+    assert loads(json.dumps(VALID | {"layers": full})).shape_count == MAX_SHAPES
+    text = json.dumps(VALID | {"layers": [*full, CIRCLE]})
     assert refusal(text) == "layers: at most 65536 shapes, got 65537"
 
 
-def test_the_largest_union_can_be_exported_and_drawn():
-    union = UNION | {"union": [BLOB | {"center": [i / MAX_UNION, 0]} for i in range(MAX_UNION)]}
-    scene = loads(json.dumps(VALID | {"layers": [union], "width": 3, "height": 2}))
+def test_the_largest_layer_can_be_exported_and_drawn():
+    shapes = [BLOB | {"center": [i / MAX_JOINED, 0]} for i in range(MAX_JOINED)]
+    scene = loads(json.dumps(VALID | {"layers": [{"shapes": shapes}], "width": 3, "height": 2}))
     for target in ("glsl", "shadertoy", "wgsl", "png"):
-        assert sdf2vec.export(scene, target)
-    assert sdf2vec.export(scene, "glsl", layout="readable")
+        assert export(scene, target)
+    assert export(scene, "glsl", layout="readable")
 
 
 @pytest.mark.parametrize("depth", [10, 900, 950, 970, 980, 990, 1000, 100_000])
@@ -447,7 +628,9 @@ def test_every_truncation_is_refused():
 
 # --- fuzzing -----------------------------------------------------------------------------------------------
 
-any_text = st.text(max_size=8) | st.sampled_from(["kind", "radius", "union", "circle", "additive", "a\nb"])
+any_text = st.text(max_size=8) | st.sampled_from(
+    ["kind", "radius", "shapes", "join", "linear", "circle", "additive", "a\nb"]
+)
 any_number = st.floats() | st.integers() | st.sampled_from([0, -1, 1, 10**400, -(10**30), 1e308, 5e-324])
 any_json = st.recursive(
     st.none() | st.booleans() | any_number | any_text,
@@ -494,17 +677,37 @@ def test_layers_and_shapes_refuse_the_same_in_python():
         Shape.of("circle", (0, 0, 0), center=(0, 0), radius=-3)
     with pytest.raises(SceneError, match=r"^parameters: a circle has 3 numbers, got 2$"):
         Shape("circle", (0, 0), (0, 0, 0))
-    with pytest.raises(SceneError, match=r"^union: must hold at least 1 shape, got 0$"):
+    with pytest.raises(SceneError, match=r"^shapes: must be a list of length >= 1, got \(\)$"):
         Layer((), 0.1)
-    with pytest.raises(SceneError, match=r"^width: must be between 1 and 65536"):
+    with pytest.raises(SceneError, match=r"^joints: must be 1, got 0$"):
+        Layer((SPOT, SPOT), 0.1)
+    with pytest.raises(SceneError, match=r"^shapes\[1\].smoothness: must be >= 0, got -1$"):
+        Layer.union((SPOT, SPOT), -1, 0.1)
+    with pytest.raises(SceneError, match=r"^paint_parameters: the paint linear has 5 numbers, got 1$"):
+        Shape("circle", (0, 0, 1), (0, 0, 0), "linear", (1,))
+    with pytest.raises(SceneError, match=r"^width: must be <= 65536"):
         Scene(10**4000, 1, ())
+    with pytest.raises(SceneError, match=r"^radius: must be finite"):
+        Shape("circle", (0, 0, 10**400))
     with pytest.raises(SceneError, match=r"^kind: must be one of"):
         Shape.of("\n", (0, 0, 0))
 
 
-def test_a_single_shape_has_no_smoothness_to_disagree_about():
-    shape = Shape.of("circle", (0, 0, 0), center=(0, 0), radius=1)
-    assert Layer((shape,), 0.1, 1.0, 0.5) == Layer((shape,), 0.1)
+SPOT = Shape.of("circle", (1, 0, 0), center=(0, 0), radius=1)
+
+
+def test_numbers_of_numpy_are_numbers():
+    shape = Shape("circle", tuple(np.array([0.1, 0.2, 0.3])), tuple(np.ones(3)))
+    assert shape == Shape("circle", (0.1, 0.2, 0.3), (1.0, 1.0, 1.0))
+    assert {type(number) for number in (*shape.parameters, *shape.color)} == {float}
+
+
+def test_what_takes_away_has_no_colour():
+    for join in JOINS:
+        layer = Layer((SPOT, SPOT), joints=(Joint(join, 0.5),))
+        assert layer.shapes[1].color == ((1, 0, 0) if join == "union" else (0, 0, 0))
+        assert len(layer.numbers) == row_width(layer.structure)
+        assert Layer.from_numbers(layer.structure, layer.numbers) == layer
 
 
 def test_scenes_are_frozen():

@@ -11,7 +11,8 @@ from ..layer import PIXEL, Formula, P, Part
 from ..lower.javascript import function_text
 from ..lower.shader import GLSL, definition, expression, used_functions
 from ..paints import FLAT, PAINTS
-from ..scene import FORMAT, MAX_JOINED, VERSION, Scene
+from ..scene import MAX_JOINED, Scene
+from ..scene_file import FORMAT, VERSION
 from ..shapes import KINDS
 from ..templating import template
 from .exported import Exported

@@ -5,7 +5,8 @@ from __future__ import annotations
 from ..errors import Sdf2vecError
 from ..image import MAX_PIXELS, encode_png, fitted_size
 from ..render.draw import pixels_of
-from ..scene import Scene, dumps
+from ..scene import Scene
+from ..scene_file import dumps
 from .exported import Exported
 from .options import Options
 

@@ -17,7 +17,7 @@ from ..deferred import deferred
 from ..errors import Sdf2vecError
 from ..paints import FLAT, PAINTS
 from ..scene import MAX_JOINED, MAX_SHAPES, Color, Scene
-from ..scene import load as load_scene
+from ..scene_file import load as load_scene
 from ..shapes import KINDS
 from .presets import DEFAULT, PRESETS, SOFTEST, Loss, Preset
 
