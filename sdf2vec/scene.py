@@ -208,6 +208,11 @@ class Shape:
         """The paint's parameters by name, `color` first."""
         return named(PAINTS[self.paint].parameters, (*self.color, *self.paint_parameters))
 
+    @property
+    def colors(self) -> tuple[Color, ...]:
+        """All colours that the paint is made of."""
+        return tuple(v for v in self.painted().values() if isinstance(v, tuple) and len(v) == 3)
+
 
 def _taken(rest: Iterator[float], parameters: Iterable[Parameter]) -> tuple[float, ...]:
     """The numbers of some parameters, which come next in a row."""
@@ -222,11 +227,6 @@ def _checked_row(
     if len(row) != count:
         raise SceneError(path, f"{owner} has {count} numbers, got {len(row)}")
     return numbers_of(parameters, named(parameters, row)) if parameters else ()
-
-    @property
-    def colors(self) -> tuple[Color, ...]:
-        """All colours that the paint is made of."""
-        return tuple(v for v in self.painted().values() if isinstance(v, tuple) and len(v) == 3)
 
 
 class Joint(NamedTuple):
