@@ -46,7 +46,7 @@ def drawn(scene: Scene, channels: int) -> torch.Tensor:
 @pytest.mark.parametrize("weighted", [False, True])
 def test_importance_is_what_the_image_loses(monkeypatch, compositing, transparent, weighted):
     """Against leaving each layer out; the probes' spread is that of a mean of squares, at most √(2/probes)."""
-    monkeypatch.setattr(growth, "PROBES", 1500)
+    monkeypatch.setattr(growth, "PROBES", 500)
     scene = random_scene(
         compositing=compositing, transparent=transparent, width=18, height=12, layers=7, seed=3
     )
@@ -63,9 +63,9 @@ def test_importance_is_what_the_image_loses(monkeypatch, compositing, transparen
     scores = importance(image, tensors, seeded(), weights)
     estimate = torch.empty(7)
     for group, score in zip(tensors.groups, scores, strict=True):
-        estimate[group.order] = score / 1500
-    assert (estimate - expected).abs().max() <= 5 * math.sqrt(2 / 1500) * expected.max()
-    assert ((estimate / expected - 1).abs()[expected > 1e-6] < 5 * math.sqrt(2 / 1500)).all()
+        estimate[group.order] = score / 500
+    assert (estimate - expected).abs().max() <= 5 * math.sqrt(2 / 500) * expected.max()
+    assert ((estimate / expected - 1).abs()[expected > 1e-6] < 5 * math.sqrt(2 / 500)).all()
 
 
 def test_importance_of_a_layer_that_shows_nowhere_is_nothing():
