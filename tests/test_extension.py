@@ -196,13 +196,12 @@ RENDERERS = {
 
 
 @pytest.mark.filterwarnings("ignore::RuntimeWarning:triton")
-@pytest.mark.parametrize("compositing", COMPOSITING)
 @pytest.mark.parametrize("name", RENDERERS)
-def test_every_renderer_draws_it_and_knows_its_derivatives(name, compositing, require_engine):
+def test_every_renderer_draws_it_and_knows_its_derivatives(name, require_engine):
     if name == "triton":
         require_engine("triton")
     composite, dtype, tolerance = RENDERERS[name]
-    scene = toy_scene(compositing)
+    scene = toy_scene()
     device = DEVICE if name == "triton" else "cpu"
     want = outcome(reference.composite, from_scene(scene, torch.float64))
     got = outcome(composite, from_scene(scene, dtype, device))

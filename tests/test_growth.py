@@ -47,9 +47,8 @@ def drawn(scene: Scene, channels: int) -> torch.Tensor:
 def test_importance_is_what_the_image_loses(monkeypatch, compositing, transparent, weighted):
     """Against leaving each layer out; the probes' spread is that of a mean of squares, at most √(2/probes)."""
     monkeypatch.setattr(growth, "PROBES", 500)
-    scene = random_scene(
-        compositing=compositing, transparent=transparent, width=18, height=12, layers=7, seed=3
-    )
+    kinds, look = ("circle", "box", "gabor"), {"compositing": compositing, "transparent": transparent}
+    scene = random_scene(kinds, width=18, height=12, layers=7, seed=3, joins=("union",), **look)
     channels = 4 if transparent else 3
     full = drawn(scene, channels)
     weights = torch.linspace(0.0, 1.0, 18).expand(12, 18) if weighted else None
@@ -170,7 +169,7 @@ def test_the_draw_order_has_no_gaps_and_new_layers_lie_on_top():
 
 
 def test_a_group_may_lose_all_rows_and_a_new_kind_may_come():
-    scene = random_scene(("box",), layers=3, joins=())
+    scene = random_scene(("box",), layers=3, joins=(), paints=("flat",))
     tensors = from_scene(scene)
     optimizer = adam(tensors)
     exchange(tensors, optimizer, [torch.arange(0)], circles(2))
