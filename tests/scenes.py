@@ -5,6 +5,7 @@ from collections.abc import Sequence
 
 from sdf2vec import Joint, Layer, Scene, Shape
 from sdf2vec.blend import COMPOSITING, JOINS
+from sdf2vec.layer import Part, Structure
 from sdf2vec.paints import PAINTS
 from sdf2vec.shapes import KINDS
 
@@ -41,11 +42,17 @@ def random_layer(
     joins: Sequence[str] = ("union",),
 ) -> Layer:
     """A layer of one shape of each kind, joined in one of these ways."""
+    structure = (Part(kinds[0], paint), *(Part(kind, paint, r.choice(joins)) for kind in kinds[1:]))
+    return random_layer_of(structure, r, compositing)
+
+
+def random_layer_of(structure: Structure, r: random.Random, compositing: str) -> Layer:
+    """A layer of this structure."""
     lowest = COMPOSITING[compositing].lowest
     falloff = r.choice([0.0, 0.003, 0.05, 0.3])
     opacity = r.choice([1.0, r.uniform(lowest, 1.0)])
-    shapes = tuple(random_shape(kind, r, lowest, paint) for kind in kinds)
-    joints = tuple(Joint(r.choice(joins), r.choice([0.0, r.uniform(0.01, 0.1)])) for _ in shapes[1:])
+    shapes = tuple(random_shape(part.kind, r, lowest, part.paint) for part in structure)
+    joints = tuple(Joint(part.join, r.choice([0.0, r.uniform(0.01, 0.1)])) for part in structure[1:])
     return Layer(shapes, falloff, opacity, joints)
 
 
@@ -70,3 +77,26 @@ def random_scene(
         made.append(random_layer((kind, *more), r, compositing, paints[i % len(paints)], joins))
     background = None if transparent else (r.random(), r.random(), r.random())
     return Scene(width, height, tuple(made), background, compositing)
+
+
+# Every kind, paint and join, in families of few structures: each structure costs seconds to compile.
+FAMILIES = {
+    "plain": [(Part("circle"),), (Part("box"),)],
+    "union": [(Part("circle"), Part("triangle", "linear", "union")), (Part("ellipse", "linear"),)],
+    "cut": [
+        (Part("box", "linear"), Part("circle", join="subtraction"), Part("ellipse", join="intersection")),
+        (Part("displaced"),),
+    ],
+    "patches": [(Part("gaussian", "linear"),), (Part("gabor"),)],
+}
+
+
+def scene_of(family, compositing="over", layers=12, seed=0, size=(60, 40), transparent=False):
+    """Random layers of a family's structures, each of which is present: one compiled module serves all tests."""
+    r = random.Random(seed)
+    count = max(layers, len(FAMILIES[family]))
+    made = [
+        random_layer_of(FAMILIES[family][i % len(FAMILIES[family])], r, compositing) for i in range(count)
+    ]
+    background = None if transparent else (r.random(), r.random(), r.random())
+    return Scene(*size, tuple(made), background, compositing)

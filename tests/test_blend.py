@@ -5,9 +5,11 @@ import math
 import numpy as np
 import pytest
 import torch
+from scipy.special import logsumexp
 
 from sdf2vec.blend import (
     CUTOFF,
+    JOINS,
     MIN_FALLOFF_PIXELS,
     additive,
     coverage,
@@ -16,7 +18,6 @@ from sdf2vec.blend import (
     pixel_size,
     reach,
     scene_point,
-    smooth_union,
     union_reach,
 )
 from sdf2vec.expr import (
@@ -102,45 +103,71 @@ def test_coverage_has_finite_derivatives(distance, width, size):
     assert all(torch.isfinite(part) for part in parts)
 
 
-# --- smooth union ------------------------------------------------------------------------------------------
-
-D = [var(f"e{i}") for i in range(4)]
+# --- joins --------------------------------------------------------------------------------------------------
 
 
-def union(distances, smoothness, colors=None):
-    named = D[: len(distances)]
-    tints = [vec3(*(const(c) for c in color)) for color in colors or [(0, 0, 0)] * len(distances)]
-    distance, color = smooth_union(named, tints, k)
-    values = {f"e{i}": v for i, v in enumerate(distances)} | {"k": smoothness}
-    return value(distance, **values), value(color, **values)
+def joined(name, rows, smoothness):
+    """Rows (r, g, b, d) joined one after the other, with the same smoothness."""
+    found = vec4(*map(const, rows[0]))
+    for row in rows[1:]:
+        found = JOINS[name].formula(found, vec4(*map(const, row)), k)
+    return value(found, k=smoothness)
 
 
-@pytest.mark.parametrize("distances", [[0.3, 0.1], [0.2, 0.2, 0.2], [-0.4, 0.1, 0.05, 2.0]])
+def rows_of(distances):
+    return [(0.1 * i, 1.0 - 0.2 * i, 0.5, distance) for i, distance in enumerate(distances)]
+
+
+DISTANCES = [[0.3, 0.1], [0.2, 0.2, 0.2], [-0.4, 0.1, 0.05, 2.0], [-0.3, -0.25, -0.2]]
+
+
+@pytest.mark.parametrize("distances", DISTANCES)
 @pytest.mark.parametrize("smoothness", [0.01, 0.1, 1.0])
-def test_smooth_union_is_the_exponential_minimum(distances, smoothness):
-    naive = -smoothness * math.log(sum(math.exp(-v / smoothness) for v in distances))
-    colors = [(0.1 * i, 1.0 - 0.2 * i, 0.5) for i in range(len(distances))]
-    weights = np.array([math.exp(-v / smoothness) for v in distances])
-    mean = weights @ np.array(colors) / weights.sum()
-    distance, color = union(distances, smoothness, colors)
-    assert distance == pytest.approx(naive, abs=1e-12)
-    assert color == pytest.approx(list(mean), abs=1e-12)
+def test_unions_one_after_the_other_are_the_exponential_minimum_of_all(distances, smoothness):
+    d = np.array(distances)
+    weights = np.exp(-d / smoothness - logsumexp(-d / smoothness))
+    rows = np.array(rows_of(distances))
+    *color, distance = joined("union", rows.tolist(), smoothness)
+    assert distance == pytest.approx(-smoothness * logsumexp(-d / smoothness), abs=1e-12)
+    assert color == pytest.approx(list(weights @ rows[:, :3]), abs=1e-12)
 
 
-def test_smooth_union_is_stable_where_the_plain_formula_overflows():
-    distance, color = union([-50.0, 900.0], 1e-3, [(1, 0, 0), (0, 1, 0)])
-    assert distance == -50.0
-    assert color == [1.0, 0.0, 0.0]
+@pytest.mark.parametrize("smoothness", [0.01, 0.1, 1.0])
+@pytest.mark.parametrize(
+    "distances", [row for row in DISTANCES if len(row) == 2] + [[-0.2, -0.1], [-0.3, 0.3]]
+)
+def test_subtraction_and_intersection_are_exponential_maxima_in_the_first_colour(distances, smoothness):
+    a, b = distances
+    for name, other in (("subtraction", -b), ("intersection", b)):
+        *color, distance = joined(name, rows_of(distances), smoothness)
+        assert distance == pytest.approx(
+            smoothness * logsumexp([a / smoothness, other / smoothness]), abs=1e-12
+        )
+        assert color == list(rows_of(distances)[0][:3])
 
 
-def test_a_union_of_one_is_the_shape_itself():
-    assert smooth_union([d], [vec3(0.5)], k) == (d, vec3(0.5))
+@pytest.mark.parametrize(
+    ("name", "sharp"),
+    [("union", min), ("subtraction", lambda a, b: max(a, -b)), ("intersection", max)],
+)
+def test_without_smoothness_joins_are_sharp(name, sharp):
+    for a in (-0.7, -0.1, 0.0, 0.1, 0.4):
+        for b in (-0.5, -0.1, 0.0, 0.2):
+            assert joined(name, rows_of([a, b]), 0.0)[3] == pytest.approx(sharp(a, b), abs=1e-6)
+
+
+@pytest.mark.parametrize("name", JOINS)
+def test_joins_are_stable_where_the_plain_formula_overflows(name):
+    one, other = joined(name, [(1, 0, 0, -50.0), (0, 1, 0, 900.0)], 1e-3), (1.0, 0.0, 0.0)
+    assert one[:3] == list(other)
+    assert one[3] == {"union": -50.0, "subtraction": -50.0, "intersection": 900.0}[name]
+    assert np.isfinite(joined(name, [(1, 0, 0, 1e4), (0, 1, 0, -1e4)], 0.0)).all()
 
 
 def test_union_reaches_no_farther_than_it_says():
     for count in (2, 3, 4):
-        distance, _ = union([0.25] * count, 0.1)
-        assert 0.25 - distance <= constant(union_reach(count, const(0.1))) + 1e-12
+        distance = joined("union", [(0, 0, 0, 0.25)] * count, 0.1)[3]
+        assert 0.25 - distance == pytest.approx(0.1 * math.log(count))
         assert 0.25 - distance == pytest.approx(constant(union_reach(count, const(0.1))))
     assert constant(union_reach(1, const(0.1))) == 0.0
 

@@ -8,12 +8,14 @@ import pytest
 import torch
 
 import sdf2vec
+from sdf2vec.blend import COMPOSITING
 from sdf2vec.fit import backends, constraints, loop, losses
 from sdf2vec.fit.initialization import Layers, detail, place
 from sdf2vec.fit.loop import Progress, fit_picture, scaled
-from sdf2vec.fit.presets import PRESETS, RATES, Start
+from sdf2vec.fit.presets import PRESETS, Start
 from sdf2vec.fit.settings import Settings
 from sdf2vec.image import Picture
+from sdf2vec.layer import Part
 from sdf2vec.metrics import mse, psnr
 from sdf2vec.render import culled, triton_fused
 from sdf2vec.render.reference import render
@@ -56,7 +58,7 @@ def test_every_kind_fits(kind):
     scene = fit_picture(pic, Settings(6, (kind,), preset="fast"))
     flat = as_tensor(pic).mean(dim=(1, 2), keepdim=True).expand(3, 32, 48)
     assert float(mse(render(scene)[:3], as_tensor(pic))) < 0.25 * float(mse(flat, as_tensor(pic)))
-    assert {layer.kind for layer in scene.layers} == {kind}
+    assert {layer.structure for layer in scene.layers} == {(Part(kind),)}
 
 
 def remember(seen):
@@ -132,8 +134,8 @@ def test_shapes_start_where_the_picture_has_detail():
     assert float(density[:17, :17].sum()) > 0.6
     generator = torch.Generator().manual_seed(0)
     tensors = place(pixels, (1.0, 1.0), Layers(("circle",), "over"), 100, Start(), generator)
-    centers = tensors.groups[0].parameters["center"][:, 0]
-    radii = tensors.groups[0].parameters["radius"][:, 0, 0]
+    centers = tensors.groups[0].of("center", 0)
+    radii = tensors.groups[0].of("radius", 0)[:, 0]
     corner = (centers < -0.25).all(dim=1)
     assert int(corner.sum()) > 50
     assert float(radii[corner].mean()) < 0.5 * float(radii[~corner].mean())
@@ -145,18 +147,18 @@ def test_constraints_hold_after_anything():
         tensors = from_scene(random_scene(compositing=compositing, layers=20))
         with torch.no_grad():
             for group in tensors.groups:
-                for _, tensor in group.tensors():
+                for tensor in group.values.values():
                     tensor.add_(torch.randn(tensor.shape, generator=torch.Generator().manual_seed(1)) * 200)
         constraints.project(tensors, 0.01)
         for group in tensors.groups:
-            for parameter in KINDS[group.kind].parameters:
-                values = group.parameters[parameter.name]
-                assert float(values.min()) >= parameter.minimum
-                assert float(values.max()) <= parameter.maximum
+            for slot, values in group.values.items():
+                parameter = slot.parameter
+                assert float(values.min()) >= parameter.unit.low
+                assert float(values.max()) <= parameter.unit.high
                 if parameter.positive:
                     assert float(values.min()) >= 0.01 - 1e-6
             assert float(group.opacity.abs().max()) <= 1.0
-            assert float(group.colors.min()) >= (-1.0 if compositing == "additive" else 0.0)
+            assert min(float(colors.min()) for colors in group.colors) >= COMPOSITING[compositing].lowest
 
 
 def test_pictures_are_scaled_down_only():
@@ -171,9 +173,16 @@ def test_a_premultiplied_picture_stays_so_when_scaled():
     assert scaled(pixels, 1)[:, 0, 0].tolist() == pytest.approx([0.4, 0.2, 0.1, 0.5], abs=1e-6)
 
 
-def test_everything_that_moves_has_a_rate():
-    names = {name for group in from_scene(random_scene(layers=20)).groups for name, _ in group.tensors()}
-    assert names | {"background"} == set(RATES)
+@pytest.mark.parametrize(
+    ("compositing", "transparent", "still"),
+    [("over", False, 0), ("over", True, 1), ("additive", False, 1), ("additive", True, 1)],
+)
+def test_all_that_is_seen_moves(compositing, transparent, still):
+    """Not: a background that there is none of; an opacity that adds to the alpha of an opaque ground."""
+    scene = random_scene(("circle",), compositing, 4, joins=(), paints=("flat",), transparent=transparent)
+    tensors = from_scene(scene)
+    everything = [tensor for group in tensors.groups for tensor in group.values.values()]
+    assert len(loop.adam(tensors).moving) == len([*everything, tensors.background]) - still
 
 
 def test_a_device_that_is_not_there_is_refused_in_one_line():

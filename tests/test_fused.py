@@ -6,25 +6,31 @@ from hypothesis import Phase, given, settings
 from hypothesis import strategies as st
 
 from sdf2vec import Layer, Scene, Shape
+from sdf2vec.blend import COMPOSITING, JOINS
 from sdf2vec.fit.ssim import Dissimilarity
+from sdf2vec.layer import Part
 from sdf2vec.metrics import ssim
+from sdf2vec.paints import PAINTS
 from sdf2vec.render import draw, fused, kernels, reference
-from sdf2vec.render.kernels import LayerKind
 from sdf2vec.render.tensors import from_scene
 from sdf2vec.shapes import KINDS
 
-from .scenes import random_scene
+from .scenes import FAMILIES, scene_of
 
 VALUES, GRADIENTS = 1e-4, 1e-3
-UNIONS = {"circle": (3,), "box": (2,)}  # others follow the same code; each costs seconds to compile
+
+
+MODULES = [  # each takes half a minute to compile, so not all
+    *(("plain", "over"), ("plain", "additive"), ("union", "over"), ("cut", "additive")),
+    *(("patches", "over"), ("patches", "additive")),
+]
 
 
 def outcome(composite, scene, size, dtype, channels=4):
     """The image, and the derivatives of a fixed random sum of it, by the name of what each belongs to."""
     tensors = from_scene(scene, dtype)
-    named = [pair for group in tensors.groups for pair in group.tensors()] + [
-        ("background", tensors.background)
-    ]
+    named = [(slot.parameter.name, v) for group in tensors.groups for slot, v in group.values.items()]
+    named.append(("background", tensors.background))
     leaves = [tensor.requires_grad_() for _, tensor in named]
     image = composite(tensors, *size)[:channels]
     weights = torch.randn(image.shape, generator=torch.Generator().manual_seed(1), dtype=torch.float64)
@@ -49,33 +55,23 @@ def assert_same_function(scene, size, channels=4):
 SIZES = st.sampled_from([(60, 40), (1, 1), (1, 37), (33, 17), (16, 16), (50, 71)])
 
 
-@given(st.integers(0, 10**6), st.integers(1, 14), st.sampled_from(["over", "additive"]), st.booleans(), SIZES)
-@settings(max_examples=40, deadline=None, phases=[Phase.explicit, Phase.reuse, Phase.generate])
-def test_same_function_as_the_reference(seed, layers, compositing, transparent, size):
-    width, height = size
-    scene = random_scene(tuple(KINDS), compositing, layers, seed, width, height, transparent, UNIONS)
-    assert_same_function(whole(scene), size)
+@pytest.mark.parametrize(("family", "compositing"), MODULES)
+@given(st.integers(0, 10**6), st.integers(1, 14), st.booleans(), SIZES)
+@settings(max_examples=8, deadline=None, phases=[Phase.explicit, Phase.reuse, Phase.generate])
+def test_same_function_as_the_reference(family, compositing, seed, layers, transparent, size):
+    assert_same_function(scene_of(family, compositing, layers, seed, size, transparent), size)
 
 
-def whole(scene):
-    """The scene, with every kind of layer present once more: one compiled module serves all examples."""
-    extra = random_scene(tuple(KINDS), scene.compositing, layers=30, seed=99, unions=UNIONS).layers
-    missing = {(layer.kind, len(layer.shapes)): layer for layer in extra}
-    present = {(layer.kind, len(layer.shapes)) for layer in scene.layers}
-    far = [layer for key, layer in missing.items() if key not in present]
-    layers = sorted((*scene.layers, *far), key=lambda layer: (layer.kind, len(layer.shapes)))
-    order = {id(layer): i for i, layer in enumerate(scene.layers)}
-    moved = sorted(layers, key=lambda layer: order.get(id(layer), -1))
-    firsts = {(layer.kind, len(layer.shapes)): layer for layer in reversed(layers)}
-    rest = [layer for layer in moved if layer is not firsts[layer.kind, len(layer.shapes)]]
-    return Scene(scene.width, scene.height, (*firsts.values(), *rest), scene.background, scene.compositing)
+def test_families_have_everything():
+    parts = [part for structures in FAMILIES.values() for structure in structures for part in structure]
+    assert {part.kind for part in parts} == set(KINDS)
+    assert {part.paint for part in parts} == set(PAINTS)
+    assert {part.join for part in parts} == {"", *JOINS}
+    assert [{name for name, _ in MODULES}, {name for _, name in MODULES}] == [set(FAMILIES), set(COMPOSITING)]
 
 
-@pytest.mark.parametrize("compositing", ["over", "additive"])
-def test_three_channels(compositing):
-    assert_same_function(
-        whole(random_scene(compositing=compositing, seed=5, unions=UNIONS)), (45, 31), channels=3
-    )
+def test_three_channels():
+    assert_same_function(scene_of("plain", seed=5), (45, 31), channels=3)
 
 
 def circles(*circles_, compositing="over"):
@@ -83,7 +79,8 @@ def circles(*circles_, compositing="over"):
         Layer((Shape.of("circle", color, center=center, radius=radius),), falloff, opacity)
         for center, radius, falloff, opacity, color in circles_
     )
-    return whole(Scene(64, 64, layers, (0.2, 0.4, 0.6), compositing))
+    far = Layer((Shape.of("box", center=(9, 9), half_size=(0.1, 0.1), angle=0, corner_radius=0),))
+    return Scene(64, 64, (far, *layers), (0.2, 0.4, 0.6), compositing)
 
 
 @pytest.mark.parametrize(
@@ -106,7 +103,7 @@ def test_a_scene_without_layers():
 
 
 def test_the_number_of_threads_changes_nothing(monkeypatch):
-    scene = whole(random_scene(layers=40, seed=12, unions=UNIONS))
+    scene = scene_of("union", layers=40, seed=12)
     results = []
     for count in ("1", "2", "3"):
         monkeypatch.setenv("SDF2VEC_THREADS", count)
@@ -116,16 +113,15 @@ def test_the_number_of_threads_changes_nothing(monkeypatch):
         assert all(torch.equal(a, b) for a, b in zip(results[0], other, strict=True))
 
 
-def test_bins_hold_every_pixel_that_is_covered():
+@pytest.mark.parametrize(("family", "compositing"), MODULES)
+def test_bins_hold_every_pixel_that_is_covered(family, compositing):
     """Culling by tile loses nothing: where the reference covers a pixel, its tile lists the layer."""
-    scene = whole(random_scene(layers=25, seed=21, unions=UNIONS))
+    scene = scene_of(family, compositing, layers=25, seed=21)
     tensors = from_scene(scene)
-    image = fused.composite(tensors, 80, 64)
-    assert image.shape == (4, 64, 80)
     x, y, pixel = reference.canvas(tensors, 80, 64)
     bins = binned(tensors, 80, 64)
     for group in tensors.groups:
-        cover, _ = reference.group_coverage(group, x, y, pixel)
+        cover, _ = reference.group_coverage(group, scene.compositing, x, y, pixel)
         for layer, covered in zip(group.order.tolist(), cover.reshape(-1, 64, 80), strict=True):
             for tile in range(5 * 4):
                 top, left = tile // 5 * 16, tile % 5 * 16
@@ -159,20 +155,20 @@ def test_fused_ssim_is_the_metric(shape):
 # --- compiling ---------------------------------------------------------------------------------------------
 
 
-def test_a_text_holds_only_the_kinds_it_is_for():
-    text = kernels.text((LayerKind("circle", 1),), "over", 3)
-    assert "# circle, 1 joined" in text
-    assert not any(f"# {kind}," in text for kind in KINDS if kind != "circle")
+def test_a_text_holds_only_the_structures_it_is_for():
+    text = kernels.text(((Part("circle", "linear"),),), "over", 3)
+    assert "# linear circle" in text
+    assert "linearPaint" not in kernels.text(((Part("circle"),),), "over", 3)
 
 
 def test_kernel_text_is_plain_python():
-    text = kernels.text(tuple(LayerKind(kind, size) for kind in KINDS for size in (1, 2)), "over", 4)
+    text = kernels.text(tuple(s for structures in FAMILIES.values() for s in structures), "over", 4)
     compile(text, "kernels", "exec")
     assert "{{" not in text
 
 
 def test_large_scenes_are_drawn_by_the_fused_renderer_and_look_the_same(monkeypatch):
-    scene = whole(random_scene(seed=5, unions=UNIONS))
+    scene = scene_of("union", seed=5)
     dense = draw.draw(scene, 50, 40)
     assert torch.equal(dense, reference.render(scene, 50, 40))
     monkeypatch.setattr(draw, "LARGE", 0)

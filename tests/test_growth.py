@@ -13,6 +13,7 @@ from sdf2vec.fit.initialization import Layers, Places, empty_groups, groups_at
 from sdf2vec.fit.loop import adam
 from sdf2vec.fit.matching_pursuit import WIDTH, find_discs
 from sdf2vec.fit.presets import Relocation
+from sdf2vec.layer import Part
 from sdf2vec.render.reference import composite
 from sdf2vec.render.tensors import Group, from_scene, to_scene
 
@@ -45,10 +46,9 @@ def drawn(scene: Scene, channels: int) -> torch.Tensor:
 @pytest.mark.parametrize("weighted", [False, True])
 def test_importance_is_what_the_image_loses(monkeypatch, compositing, transparent, weighted):
     """Against leaving each layer out; the probes' spread is that of a mean of squares, at most √(2/probes)."""
-    monkeypatch.setattr(growth, "PROBES", 1500)
-    scene = random_scene(
-        compositing=compositing, transparent=transparent, width=18, height=12, layers=7, seed=3
-    )
+    monkeypatch.setattr(growth, "PROBES", 500)
+    kinds, look = ("circle", "box", "gabor"), {"compositing": compositing, "transparent": transparent}
+    scene = random_scene(kinds, width=18, height=12, layers=7, seed=3, joins=("union",), **look)
     channels = 4 if transparent else 3
     full = drawn(scene, channels)
     weights = torch.linspace(0.0, 1.0, 18).expand(12, 18) if weighted else None
@@ -62,9 +62,9 @@ def test_importance_is_what_the_image_loses(monkeypatch, compositing, transparen
     scores = importance(image, tensors, seeded(), weights)
     estimate = torch.empty(7)
     for group, score in zip(tensors.groups, scores, strict=True):
-        estimate[group.order] = score / 1500
-    assert (estimate - expected).abs().max() <= 5 * math.sqrt(2 / 1500) * expected.max()
-    assert ((estimate / expected - 1).abs()[expected > 1e-6] < 5 * math.sqrt(2 / 1500)).all()
+        estimate[group.order] = score / 500
+    assert (estimate - expected).abs().max() <= 5 * math.sqrt(2 / 500) * expected.max()
+    assert ((estimate / expected - 1).abs()[expected > 1e-6] < 5 * math.sqrt(2 / 500)).all()
 
 
 def test_importance_of_a_layer_that_shows_nowhere_is_nothing():
@@ -101,7 +101,7 @@ def circles(count: int, seed: int = 0) -> list[Group]:
 
 
 def two_kinds():
-    scene = random_scene(("circle", "box"), layers=8, unions={})
+    scene = random_scene(("circle", "box"), layers=8, joins=())
     tensors = from_scene(scene)
     return tensors, adam(tensors)
 
@@ -115,7 +115,7 @@ def step(tensors, optimizer, times=1):
 
 
 def numbers_of(tensors):
-    return [tensor.detach().clone() for group in tensors.groups for _, tensor in group.tensors()]
+    return [tensor.detach().clone() for group in tensors.groups for tensor in group.values.values()]
 
 
 def test_exchanging_nothing_changes_no_step():
@@ -134,7 +134,7 @@ def test_exchanging_nothing_changes_no_step():
 def test_rows_that_stay_keep_their_history_and_new_ones_have_none():
     tensors, optimizer = two_kinds()
     step(tensors, optimizer, 3)
-    radius = tensors.groups[0].parameters["radius"]
+    radius = tensors.groups[0].of("radius", 0)
     index = next(i for i, moving in enumerate(optimizer.moving) if moving.tensor is radius)
     moving = optimizer.moving[index]
     before, values = (moving.mean.clone(), moving.square.clone()), radius.detach().clone()
@@ -143,9 +143,9 @@ def test_rows_that_stay_keep_their_history_and_new_ones_have_none():
         group.order += tensors.layer_count
     stays = [torch.tensor([0, 3]), torch.arange(4)]
     exchange(tensors, optimizer, stays, fresh)
-    now = tensors.groups[0].parameters["radius"]
+    now = tensors.groups[0].of("radius", 0)
     assert torch.equal(now[:2], values[[0, 3]])
-    assert torch.equal(now[2:], fresh[0].parameters["radius"])
+    assert torch.equal(now[2:], fresh[0].of("radius", 0))
     assert moving.tensor is now
     for after, old in zip((moving.mean, moving.square), before, strict=True):
         assert torch.equal(after[:2], old[[0, 3]])
@@ -153,7 +153,7 @@ def test_rows_that_stay_keep_their_history_and_new_ones_have_none():
         assert not after[2:].any()
     assert float(moving.steps) == 3
     trained = {id(moving.tensor) for moving in optimizer.moving}
-    assert trained == {id(t) for g in tensors.groups for _, t in g.tensors()} | {id(tensors.background)}
+    assert trained == {id(t) for g in tensors.groups for t in g.values.values()} | {id(tensors.background)}
     step(tensors, optimizer)
     assert not torch.equal(now[:2], values[[0, 3]])
 
@@ -169,16 +169,20 @@ def test_the_draw_order_has_no_gaps_and_new_layers_lie_on_top():
 
 
 def test_a_group_may_lose_all_rows_and_a_new_kind_may_come():
-    scene = random_scene(("box",), layers=3, unions={})
+    scene = random_scene(("box",), layers=3, joins=(), paints=("flat",))
     tensors = from_scene(scene)
     optimizer = adam(tensors)
     exchange(tensors, optimizer, [torch.arange(0)], circles(2))
-    assert [(group.kind, len(group.order)) for group in tensors.groups] == [("box", 0), ("circle", 2)]
-    assert {layer.kind for layer in to_scene(tensors, 60, 40).layers} == {"circle"}
+    assert [(group.structure, len(group)) for group in tensors.groups] == [
+        ((Part("box"),), 0),
+        ((Part("circle"),), 2),
+    ]
+    assert {layer.structure for layer in to_scene(tensors, 60, 40).layers} == {(Part("circle"),)}
     unions = Layers(("box",), "over", 2)
     places = Places(torch.zeros(1, 2), torch.full((1,), 0.2), torch.full((1, 4), 0.5))
     exchange(tensors, optimizer, [torch.arange(0), torch.arange(2)], groups_at(places, unions, seeded(), 2))
-    assert [(g.kind, g.union_size, len(g.order)) for g in tensors.groups][2:] == [("box", 2, 1)]
+    union = (Part("box"), Part("box", join="union"))
+    assert [(group.structure, len(group)) for group in tensors.groups][2:] == [(union, 1)]
 
 
 def test_adam_is_torchs_own():
@@ -255,7 +259,7 @@ def test_new_layers_bring_the_image_nearer_at_once(compositing, union):
     tensors.groups += densify(image, target, 2, tensors, layers, seeded())
     after = float((composite(tensors, 48, 40)[:3] - target).square().mean())
     assert after < 0.7 * before
-    middles = tensors.groups[0].parameters["center"].mean(dim=1)
+    middles = together(tensors.groups[0], "center").mean(dim=1)
     expected = (torch.tensor([[34.5, 28.5], [12.5, 10.5]]) - torch.tensor([24, 20])) / 40
     assert (middles - expected).abs().max() < 0.06
 
@@ -266,7 +270,12 @@ def test_new_layers_come_where_the_weights_are():
     weights = torch.zeros(40, 48)
     weights[:, :24] = 1
     (group,) = densify(torch.zeros(3, 40, 48), target, 1, tensors, CIRCLES, seeded(), weights)
-    assert group.parameters["center"][0, 0].tolist() == pytest.approx([-11.5 / 40, -9.5 / 40], abs=0.03)
+    assert group.of("center", 0)[0].tolist() == pytest.approx([-11.5 / 40, -9.5 / 40], abs=0.03)
+
+
+def together(group: Group, name: str) -> torch.Tensor:
+    """A parameter of all parts, [G, parts, width]."""
+    return torch.stack([group.of(name, part) for part in range(len(group.structure))], dim=1)
 
 
 # --- unions as they start ----------------------------------------------------------------------------------
@@ -279,25 +288,25 @@ def test_the_shapes_of_a_union_lie_around_its_centre(union):
     (group,) = groups_at(
         Places(centers, sizes, colors), Layers(("circle",), "over", union), seeded(), first=7
     )
-    assert (group.union_size, group.order.tolist()) == (union, [7, 8])
-    parts = group.parameters["center"]
+    assert (len(group.structure), group.order.tolist()) == (union, [7, 8])
+    parts = together(group, "center")
     assert torch.allclose(parts.mean(dim=1), centers, atol=1e-6)
     away = 0.0 if union == 1 else 0.6
     assert torch.allclose(
         (parts - centers[:, None]).norm(dim=2), away * sizes[:, None].expand(-1, union), atol=1e-6
     )
     # together they have the area of one disc of this size
-    assert torch.allclose(group.parameters["radius"][..., 0].square().sum(dim=1), sizes.square(), rtol=1e-5)
-    assert torch.equal(group.colors, colors[:, None, :3].expand(-1, union, -1))
-    assert group.opacity.tolist() == pytest.approx([0.8, 0.4])
-    assert bool((group.smoothness > 0).all()) == (union > 1)
+    assert torch.allclose(together(group, "radius")[..., 0].square().sum(dim=1), sizes.square(), rtol=1e-5)
+    assert torch.equal(together(group, "color"), colors[:, None, :3].expand(-1, union, -1))
+    assert group.opacity[:, 0].tolist() == pytest.approx([0.8, 0.4])
+    assert all(bool((group.of("smoothness", part) > 0).all()) for part in range(1, union))
 
 
 def test_kinds_are_dealt_out():
     count = 300
     places = Places(torch.zeros(count, 2), torch.full((count,), 0.1), torch.ones(count, 4))
     groups = groups_at(places, Layers(("circle", "box", "triangle"), "over"), seeded(), first=5)
-    assert [group.kind for group in groups] == ["circle", "box", "triangle"]
+    assert [group.structure[0].kind for group in groups] == ["circle", "box", "triangle"]
     assert all(60 < len(group.order) < 140 for group in groups)
     assert sorted(torch.cat([group.order for group in groups]).tolist()) == list(range(5, 5 + count))
     assert [len(group.order) for group in empty_groups(Layers(("circle", "box"), "over"))] == [0, 0]

@@ -9,13 +9,14 @@ import numpy as np
 import pytest
 
 from sdf2vec import kernel_cache
+from sdf2vec.layer import Part
 from sdf2vec.render import kernels
-from sdf2vec.render.kernels import LayerKind
 
 RUN = """
 import warnings
 warnings.simplefilter("always")
 from sdf2vec import kernel_cache
+from sdf2vec.layer import Part
 source = "from sdf2vec.kernel_cache import kernel\\n@kernel\\ndef f(x):\\n    return x + 1\\n"
 module, other = kernel_cache.load(source), kernel_cache.load(source.replace("+ 1", "+ 2"))
 before = kernel_cache.is_compiled(module.f)
@@ -112,7 +113,7 @@ def test_fingerprints_differ_with_what_compiles(monkeypatch):
 
 
 def test_kernels_of_other_formulas_are_other_kernels():
-    one, other = (kernels.load((LayerKind("circle", 1),), mode, 3) for mode in ("over", "additive"))
+    one, other = (kernels.load(((Part("circle"),),), mode, 3) for mode in ("over", "additive"))
     assert isinstance(one.forward_tiles.py_func, FunctionType)
     assert kernel_cache._stem(one.forward_tiles.py_func) != kernel_cache._stem(other.forward_tiles.py_func)
 

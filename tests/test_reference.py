@@ -60,7 +60,7 @@ def test_additive_smooth_union_on_a_transparent_ground():
         Shape.of("circle", c, center=p, radius=0.2)
         for c, p in (((0.8, 0, 0), (-0.1, 0)), ((0, 0, 0.6), (0.1, 0)))
     )
-    scene = Scene(20, 20, (Layer(shapes, 0.1, 0.9, 0.05),), None, "additive")
+    scene = Scene(20, 20, (Layer.union(shapes, 0.05, 0.1, 0.9),), None, "additive")
     x, y, pixel = numpy_grid(scene, 20, 20)
     d = np.stack([np.hypot(x + 0.1, y) - 0.2, np.hypot(x - 0.1, y) - 0.2])
     weights = np.exp(-d / 0.05)
@@ -83,7 +83,7 @@ def test_chunks_change_neither_values_nor_derivatives(compositing, monkeypatch):
     for chunk in (1 << 22, 700):
         monkeypatch.setattr(reference, "CHUNK", chunk)
         tensors = from_scene(scene, torch.float64)
-        leaves = [tensor.requires_grad_() for group in tensors.groups for _, tensor in group.tensors()]
+        leaves = [tensor.requires_grad_() for group in tensors.groups for tensor in group.values.values()]
         image = composite(tensors, 23, 17)
         results.append([image.detach(), *torch.autograd.grad(image.square().sum(), leaves)])
     for one, other in zip(*results, strict=True):
@@ -101,7 +101,7 @@ def test_derivatives_of_the_whole_render(compositing, transparent):
     def loss():
         return (composite(tensors, 16, 11) * weights).sum()
 
-    leaves = [tensor for group in tensors.groups for _, tensor in group.tensors()] + [tensors.background]
+    leaves = [tensor for group in tensors.groups for tensor in group.values.values()] + [tensors.background]
     for leaf in leaves:
         leaf.requires_grad_()
     grads = torch.autograd.grad(loss(), leaves)
@@ -144,11 +144,11 @@ def test_the_picture_of_a_huge_scene_is_finite():
 @pytest.mark.parametrize("size", [(70, 130), (1, 1), (64, 65)])
 def test_culled_is_the_same_function(compositing, size, monkeypatch):
     monkeypatch.setattr(culled, "BLOCK", 16)
-    scene = random_scene(compositing=compositing, layers=20, seed=31, unions={"circle": (3,), "box": (2,)})
+    scene = random_scene(compositing=compositing, layers=20, seed=31)
     results = []
     for draw in (reference.composite, culled.composite):
         tensors = from_scene(scene, torch.float64)
-        leaves = [tensor.requires_grad_() for group in tensors.groups for _, tensor in group.tensors()]
+        leaves = [tensor.requires_grad_() for group in tensors.groups for tensor in group.values.values()]
         image = draw(tensors, *size)
         weights = torch.randn(image.shape, generator=torch.Generator().manual_seed(1), dtype=torch.float64)
         results.append((image, *torch.autograd.grad((image * weights).sum(), leaves)))

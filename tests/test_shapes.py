@@ -41,6 +41,9 @@ BY_HAND = [
     ("displaced", (0.0, 0.0, 1.0, 0.25, math.pi, math.pi), (0.5, 0.5), DIAGONAL - 1.25),
     ("displaced", (0.0, 0.0, 1.0, 0.25, math.pi, math.pi), (3.0, 4.0), 4.0),
     ("displaced", (0.2, 0.0, 1.0, 0.0, 9.0, 7.0), (0.2, 2.0), 1.0),
+    ("gaussian", (0.0, 0.0, 2.0, 1.0, 0.0), (0.0, 3.0), 2.0),  # to where one standard deviation ends
+    ("gaussian", (0.3, 0.0, 2.0, 1.0, 0.7), (0.3, 0.0), -1.0),
+    ("gabor", (0.0, 0.0, 2.0, 1.0, math.pi / 2, 9.0, 1.0), (0.0, 2.0), 0.0),
 ]
 
 TYPICAL = {
@@ -49,6 +52,8 @@ TYPICAL = {
     "box": (0.1, -0.2, 0.4, 0.2, 0.6, 0.05),
     "triangle": (0.0, -0.3, 0.4, 0.2, -0.3, 0.1),
     "displaced": (0.1, -0.2, 0.3, 0.05, 12.0, 9.0),
+    "gaussian": (0.1, -0.2, 0.4, 0.15, 0.6),
+    "gabor": (0.1, -0.2, 0.4, 0.15, 0.6, 12.0, 1.0),
 }
 
 
@@ -85,10 +90,9 @@ def test_slope_is_one_where_the_field_is_exact_and_bounded_elsewhere(kind):
     steepness = torch.hypot(slopes[0], slopes[1])
     if KINDS[kind].exact:
         torch.testing.assert_close(steepness, torch.ones_like(steepness), rtol=0, atol=1e-9)
-    elif kind == "ellipse":
-        assert float(steepness.max()) <= 1.0 + 1e-9
     else:
-        assert float(steepness.max()) <= 1.0 + 0.05 * math.hypot(12.0, 9.0) + 1e-9
+        most = {"displaced": 1.0 + 0.05 * math.hypot(12.0, 9.0)}.get(kind, 1.0)
+        assert float(steepness.max()) <= most + 1e-9
 
 
 @pytest.mark.parametrize("kind", KINDS)
@@ -117,7 +121,7 @@ def hard_points(kind, parameters):
 
 
 def sizes_of(kind, factor):
-    units = [p.unit for p in KINDS[kind].parameters for _ in p.start]
+    units = [p.unit.name for p in KINDS[kind].parameters for _ in p.start]
     return tuple(v * (factor if u != "angle" else 1.0) for v, u in zip(TYPICAL[kind], units, strict=True))
 
 
@@ -142,13 +146,13 @@ def random_parameters(kind, numbers):
     """Any shape of moderate size, from numbers in 0..1."""
     lowest = {"position": -0.8, "length": 0.01, "angle": -7.0, "frequency": -40.0}
     highest = {"position": 0.8, "length": 0.5, "angle": 7.0, "frequency": 40.0}
-    units = [p.unit for p in KINDS[kind].parameters for _ in p.start]
+    units = [p.unit.name for p in KINDS[kind].parameters for _ in p.start]
     return tuple(lowest[u] + n * (highest[u] - lowest[u]) for n, u in zip(numbers, units, strict=False))
 
 
 @given(
     st.sampled_from(list(KINDS)),
-    st.lists(st.floats(0, 1), min_size=6, max_size=6),
+    st.lists(st.floats(0, 1), min_size=7, max_size=7),
     st.sampled_from([0.0, 0.02, 0.3]),
     st.integers(0, 1000),
 )
@@ -233,5 +237,5 @@ def test_start_values_are_within_range(kind):
     for parameter in KINDS[kind].parameters:
         assert len(parameter.start) in (1, 2)
         for value in parameter.start:
-            assert parameter.minimum <= value <= parameter.maximum
-            assert not (parameter.positive and value <= parameter.minimum)
+            assert parameter.unit.low <= value <= parameter.unit.high
+            assert not (parameter.positive and value <= parameter.unit.low)

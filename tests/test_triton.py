@@ -13,17 +13,17 @@ import pytest
 import torch
 
 from sdf2vec import Layer, Scene, Shape, kernel_cache
+from sdf2vec.blend import COMPOSITING
 from sdf2vec.expr import OPERATIONS, scalarize, var
+from sdf2vec.layer import Part
 from sdf2vec.lower import triton as triton_lowering
 from sdf2vec.lower.block import Block
 from sdf2vec.render import fused, reference, triton_fused, triton_kernels
-from sdf2vec.render.kernels import LayerKind
 from sdf2vec.render.tensors import from_scene
-from sdf2vec.shapes import KINDS
 
 from . import conftest
 from .operations import MEANINGS, expected
-from .scenes import random_scene
+from .scenes import FAMILIES, scene_of
 
 DEVICE = "cuda" if torch.cuda.is_available() else "cpu"
 if DEVICE == "cpu":  # before anything imports Triton
@@ -85,7 +85,7 @@ def test_every_row_that_computes_has_a_triton_cell():
 
 def outcome(composite, tensors, size):
     """The image, and the derivatives of a fixed random sum of it, by the name of what each belongs to."""
-    named = [pair for group in tensors.groups for pair in group.tensors()]
+    named = [(slot.parameter.name, v) for group in tensors.groups for slot, v in group.values.items()]
     named.append(("background", tensors.background))
     leaves = [tensor.requires_grad_() for _, tensor in named]
     image = composite(tensors, *size)
@@ -116,27 +116,19 @@ def assert_same_function(scene, size, channels=4):
         assert float((grad - fast_grad).abs().max()) <= GRADIENTS * largest[name], name
 
 
-@pytest.mark.parametrize("compositing", ["over", "additive"])
+@pytest.mark.parametrize("compositing", COMPOSITING)
+@pytest.mark.parametrize("family", FAMILIES)
+def test_same_function_as_the_reference(family, compositing):
+    assert_same_function(scene_of(family, compositing, 6, 1, (37, 21)), (37, 21))
+
+
+@pytest.mark.parametrize("compositing", COMPOSITING)
 @pytest.mark.parametrize(
-    ("size", "layers", "transparent", "channels"),
-    [
-        ((37, 21), 15, False, 4),
-        ((37, 21), 9, True, 4),
-        ((33, 17), 10, False, 3),
-        ((1, 1), 15, False, 4),
-        ((1, 37), 6, True, 3),
-        ((16, 16), 6, False, 4),
-    ],
+    ("size", "transparent", "channels"),
+    [((37, 21), True, 4), ((33, 17), False, 3), ((1, 1), False, 4), ((1, 37), True, 3), ((16, 16), False, 4)],
 )
-def test_same_function_as_the_reference(compositing, size, layers, transparent, channels):
-    width, height = size
-    scene = random_scene(tuple(KINDS), compositing, layers, 1, width, height, transparent)
-    assert_same_function(scene, size, channels)
-
-
-@pytest.mark.parametrize("kind", KINDS)
-def test_one_kind(kind):
-    assert_same_function(random_scene((kind,), layers=4, seed=3, width=20, height=20), (20, 20))
+def test_sizes_and_grounds(compositing, size, transparent, channels):
+    assert_same_function(scene_of("plain", compositing, 8, 1, size, transparent), size, channels)
 
 
 def circles(*rows):
@@ -173,7 +165,7 @@ def test_a_scene_without_layers():
 
 
 def test_equal_input_gives_equal_output_also_in_chunks_of_tiles(monkeypatch):
-    scene = random_scene(layers=6, seed=6)
+    scene = scene_of("union", layers=6, seed=6)
     results = []
     for scratch in (triton_fused.SCRATCH, triton_fused.SCRATCH, 4 * 4096):
         monkeypatch.setattr(triton_fused, "SCRATCH", scratch)
@@ -203,9 +195,11 @@ def bins_of(composite, tensors):
     return composite(tensors, 80, 64).grad_fn.bins
 
 
-def test_bins_are_those_of_the_cpu():
+@pytest.mark.parametrize("family", FAMILIES)
+def test_bins_are_those_of_the_cpu(family):
     """Up to rounding: a layer that only just touches a tile may be in one and not in the other."""
-    scene = random_scene(tuple(KINDS), layers=30, seed=21, unions={})
+    compositing = "additive" if family == "cut" else "over"  # what the CPU's tests have compiled
+    scene = scene_of(family, compositing, layers=20, seed=21)
     tensors = from_scene(scene, device=DEVICE)
     bins, wanted = bins_of(triton_fused.composite, tensors), bins_of(fused.composite, from_scene(scene))
     order = torch.cat([group.order for group in tensors.groups])
@@ -219,10 +213,10 @@ def test_bins_are_those_of_the_cpu():
 # --- texts and files ---------------------------------------------------------------------------------------
 
 
-def test_a_text_holds_only_the_kinds_it_is_for():
-    text = triton_kernels.text((LayerKind("circle", 1),), "over", 3)
-    assert "# circle, 1 joined" in text
-    assert not any(f"# {kind}," in text for kind in KINDS if kind != "circle")
+def test_a_text_holds_only_the_structures_it_is_for():
+    text = triton_kernels.text(((Part("circle", "linear"),),), "over", 3)
+    assert "# linear circle" in text
+    assert "ellipse" not in text
     compile(text, "kernels", "exec")
 
 
@@ -231,9 +225,7 @@ def test_without_a_cache_folder_kernels_are_in_a_temporary_file(tmp_path, monkey
     monkeypatch.setenv("SDF2VEC_CACHE", str(tmp_path / "file" / "inside"))
     kernel_cache._warn_once.cache_clear()
     with pytest.warns(RuntimeWarning, match="anew in every run"):
-        module = kernel_cache.load_file(
-            f"{triton_kernels.text((LayerKind('circle', 1),), 'over', 4)}# {tmp_path}"
-        )
+        module = kernel_cache.load_file(f"{triton_kernels.text(((Part('circle'),),), 'over', 4)}# {tmp_path}")
     assert module.__file__ is not None
     assert "def forward_tiles" in Path(module.__file__).read_text()
 
@@ -244,7 +236,7 @@ import triton
 from triton.backends.compiler import GPUTarget
 from triton.compiler import ASTSource
 from sdf2vec.render import triton_kernels
-from sdf2vec.render.kernels import LayerKind
+from sdf2vec.layer import Part
 
 POINTERS = "starts visible layers kinds places layer_starts ranges full".split()
 NUMBERS = "width height columns lines first_tile".split()
@@ -257,9 +249,12 @@ def signature(name):
     return "i32" if name in NUMBERS else "*i32" if name in POINTERS else "*i64" if name in LONG else "*fp32"
 
 
-layers = tuple(LayerKind(*kind) for kind in (("circle", 1), ("box", 1), ("triangle", 1), ("displaced", 2)))
+structures = (
+    (Part("gabor"),),
+    (Part("box", "linear"), Part("triangle", join="subtraction"), Part("displaced", join="union")),
+)
 for compositing, channels in (("over", 4), ("additive", 3)):
-    module = triton_kernels.load(layers, compositing, channels)
+    module = triton_kernels.load(structures, compositing, channels)
     for name in ("measure_layers", "find_pairs", "forward_tiles", "backward_tiles", "reduce_pairs"):
         kernel = getattr(module, name)
         types = {argument: signature(argument) for argument in kernel.arg_names}

@@ -40,6 +40,7 @@ def component(scene: Scene, options: Options) -> Exported:
         paints=json.dumps({paint.name: [p.name for p in paint.parameters] for paint in PAINTS.values()}),
         widths=json.dumps({p.name: p.width for paint in PAINTS.values() for p in paint.parameters}),
         joins=json.dumps(list(JOINS)),
+        adds=json.dumps([join.adds for join in JOINS.values()]),
         variants=json.dumps([" ".join(variant) for variant in variants]),
         flat=FLAT,
         formulas="\n\n".join(_formulas(variants)),

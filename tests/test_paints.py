@@ -1,0 +1,100 @@
+"""Paints: what colour is where, by hand, in the frame of every kind."""
+
+import math
+
+import numpy as np
+import pytest
+import torch
+
+from sdf2vec import Layer, Scene, Shape
+from sdf2vec.expr import VEC2, components_of, constant, scalarize, var, vec2, vec3
+from sdf2vec.layer import Formula, P, Part
+from sdf2vec.lower.torch import compile_torch
+from sdf2vec.paints import BASE, FLAT, PAINTS, linear_paint
+from sdf2vec.render.reference import render
+from sdf2vec.shapes import KINDS
+
+FIRST, LAST = (1.0, 0.25, 0.0), (0.0, 0.5, 1.0)
+
+# kind, numbers, the point where the x axis of its frame is −1, and where it is 1, by hand
+ENDS = [
+    ("circle", (0.1, 0.2, 0.3), (-0.2, 0.2), (0.4, 0.2)),
+    ("ellipse", (0.1, 0.2, 0.4, 0.2, math.pi / 2), (0.1, -0.2), (0.1, 0.6)),
+    (
+        "box",
+        (0.0, 0.0, 0.5, 0.1, math.pi / 4, 0.05),
+        (-0.5 * math.sqrt(0.5),) * 2,
+        (0.5 * math.sqrt(0.5),) * 2,
+    ),
+    ("triangle", (-0.3, 0.0, 0.5, 0.1, 0.1, 0.4), (-0.3, 0.2), (0.5, 0.2)),  # of the box around it
+    ("displaced", (0.0, 0.1, 0.3, 0.05, 9.0, 9.0), (-0.35, 0.1), (0.35, 0.1)),
+    ("gaussian", (0.1, 0.0, 0.2, 0.4, math.pi), (0.3, 0.0), (-0.1, 0.0)),
+    ("gabor", (0.1, 0.0, 0.2, 0.4, 0.0, 9.0, 0.0), (-0.1, 0.0), (0.3, 0.0)),
+]
+
+
+def color_at(shape, x, y):
+    """[3, P] in float64."""
+    formula = Formula.of((Part(shape.kind, shape.paint),))
+    inputs = [*components_of(P), *formula.uniforms]
+    numbers = (x, y, 0.001, *Layer((shape,)).numbers)
+    found = compile_torch([formula.color], inputs)(
+        *(torch.as_tensor(value, dtype=torch.float64) for value in numbers)
+    )
+    return np.stack([part.expand(len(x)).numpy() for part in found])
+
+
+def test_every_kind_has_a_frame_by_hand():
+    assert {row[0] for row in ENDS} == set(KINDS)
+
+
+@pytest.mark.parametrize(("kind", "numbers", "start", "end"), ENDS, ids=[row[0] for row in ENDS])
+def test_a_linear_paint_goes_along_the_axis_of_the_frame(kind, numbers, start, end):
+    """With direction (1/2, 0): its first colour at −1, half of each in the middle, its last at 1 and beyond."""
+    shape = Shape(kind, numbers, FIRST, "linear", (*LAST, 0.5, 0.0))
+    shares = np.array([-0.5, 0.0, 0.25, 0.5, 1.0, 1.5])
+    x, y = (a + shares * (b - a) for a, b in zip(start, end, strict=True))
+    want = np.outer(FIRST, 1 - shares.clip(0, 1)) + np.outer(LAST, shares.clip(0, 1))
+    np.testing.assert_allclose(color_at(shape, x, y), want, atol=1e-6)
+
+
+def test_the_direction_says_how_steep_and_where_to():
+    """t = 1/2 + q·direction: a quarter turn goes down the frame's y axis, twice as long twice as fast."""
+    shape = Shape("ellipse", (0, 0, 0.4, 0.2, 0.0), FIRST, "linear", (*LAST, 0.0, 1.0))
+    y = np.array([-0.2, -0.1, -0.05, 0.0, 0.05, 0.1, 0.2])
+    share = (0.5 + y / 0.2).clip(0, 1)
+    want = np.outer(FIRST, 1 - share) + np.outer(LAST, share)
+    np.testing.assert_allclose(color_at(shape, 0.17 + 0 * y, y), want, atol=1e-12)
+
+
+def test_no_direction_is_half_of_each():
+    shape = Shape("circle", (0, 0, 0.4), FIRST, "linear", (*LAST, 0.0, 0.0))
+    np.testing.assert_allclose(color_at(shape, np.array([9.0]), np.array([-9.0])), [[0.5], [0.375], [0.5]])
+
+
+def test_a_shape_of_no_size_has_a_colour():
+    shape = Shape("triangle", (0.1,) * 6, FIRST, "linear", (*LAST, 0.5, 0.5))
+    assert np.isfinite(color_at(shape, np.array([0.1, 0.2]), np.array([0.1, 5.0]))).all()
+
+
+@pytest.mark.parametrize("direction", [(0.5, 0.0), (0.3, -0.4), (-2.0, 1.0)])
+def test_the_ramp_is_where_the_colours_end(direction):
+    ramp = PAINTS["linear"].ramp
+    assert ramp is not None
+    for point, color in zip(ramp(LAST, direction), (FIRST, LAST), strict=True):
+        found = linear_paint(vec2(*point), vec3(*FIRST), vec3(*LAST), vec2(*direction))
+        assert [constant(part) for part in scalarize(found)] == pytest.approx(color)
+
+
+def test_all_paints_begin_with_a_colour_and_one_is_flat():
+    assert all(paint.parameters[0] is BASE for paint in PAINTS.values())
+    assert [name for name, paint in PAINTS.items() if paint.is_flat] == [FLAT]
+    q, color = var("q", VEC2), BASE.variable()
+    assert PAINTS[FLAT].color(q, color) is color
+
+
+def test_a_picture_of_a_linear_paint():
+    """A box beyond the canvas whose red goes from 0 to 1 across the canvas."""
+    shape = Shape("box", (0, 0, 2.5, 9, 0, 0), (0, 0, 0), "linear", (1, 0, 0, 1, 0))
+    want = np.tile((np.arange(10) + 0.5) / 10, (4, 1))
+    np.testing.assert_allclose(render(Scene(10, 4, (Layer((shape,)),)))[0], want, atol=1e-6)
