@@ -248,7 +248,7 @@ DIRECTION = Unit(
     "direction",
     -1000.0,
     1000.0,
-    0.02,
+    0.06,
     _keep_within(-STEEPEST, STEEPEST),
     Codec(_between("direction")),
     _turned,
