@@ -10,6 +10,7 @@ import torch
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
+import sdf2vec.scene
 from sdf2vec import (
     KINDS,
     Joint,
@@ -187,7 +188,7 @@ def test_the_first_version_is_read():
     assert loads(dumps(loads(text))) == loads(text)
     assert refusal(text.replace("0.25", "0")) == "layers[0].radius: must be > 0, got 0"
     assert (
-        refusal(text.replace("}]", ', "radius": 1}]'))
+        refusal(text.replace("}], ", ', "radius": 1}], '))
         == "layers[1].union[2].radius: appears twice in one object"
     )
     assert refusal(text.replace("0.75", "-1")) == "layers[1].smoothness: must be >= 0, got -1"
@@ -479,7 +480,7 @@ def test_a_shape_needs_a_kind():
     ids=lambda item: spelled(item) if isinstance(item, tuple) else None,
 )
 def test_what_is_as_usual_may_be_left_out(path, usual):
-    assert loads(changed(path, ABSENT)) == loads(changed(path, usual)) != loads(json.dumps(VALID))
+    assert loads(changed(path, ABSENT)) == loads(changed(path, usual))
 
 
 @pytest.mark.parametrize("kind", PATCHES)
@@ -558,7 +559,7 @@ def test_strange_names_of_fields(name):
     assert refusal(changed(("layers", 1, name), 1)).startswith("layers[1].")
 
 
-def test_absurd_counts():
+def test_absurd_counts(monkeypatch):
     many = [CIRCLE] * (MAX_SHAPES + 1)
     assert refusal(json.dumps(VALID | {"layers": many})).startswith(
         "layers: must be a list of length <= 65536, got ["
@@ -566,10 +567,10 @@ def test_absurd_counts():
     joined = {"shapes": [BLOB] * (MAX_JOINED + 1)}
     text = json.dumps(VALID | {"layers": [CIRCLE, joined]})
     assert refusal(text).startswith(f"layers[1].shapes: must be a list of length <= {MAX_JOINED}, got [")
-    full = [{"shapes": [BLOB] * MAX_JOINED}] * (MAX_SHAPES // MAX_JOINED)
-    assert loads(json.dumps(VALID | {"layers": full})).shape_count == MAX_SHAPES
-    text = json.dumps(VALID | {"layers": [*full, CIRCLE]})
-    assert refusal(text) == "layers: at most 65536 shapes, got 65537"
+    monkeypatch.setattr(sdf2vec.scene, "MAX_SHAPES", 5)
+    full = [CIRCLE, {"shapes": [BLOB] * 4}]
+    assert loads(json.dumps(VALID | {"layers": full})).shape_count == 5
+    assert refusal(json.dumps(VALID | {"layers": [*full, CIRCLE]})) == "layers: at most 5 shapes, got 6"
 
 
 def test_the_largest_layer_can_be_exported_and_drawn():
