@@ -62,7 +62,7 @@ def within(path: str) -> Iterator[None]:
 _NOUNS = {"float": "number", "int": "whole number", "array": "list"}
 _REFUSAL = re.compile(  # what msgspec says of a value
     r"(?:Object missing required field `(?P<missing>\w+)`|Expected `(?P<kind>\w+)`(?: (?P<bound>[<>]=? \S+))?"
-    r"(?P<length> of length (?:[<>]= )?\d+)?(?:, got .*)?|Number out of range)(?: - at `\$\.?(?P<path>.*)`)?"
+    r"(?P<length> of length (?:[<>]= )?\d+)?(?:, got .*?)?|Number out of range)(?: - at `\$\.?(?P<path>.*)`)?"
 )
 
 
