@@ -11,9 +11,10 @@ import pytest
 import torch
 
 from sdf2vec import Layer, Scene, Shape, dumps, loads
+from sdf2vec.api import export
 from sdf2vec.blend import COMPOSITING, JOINS, Join
 from sdf2vec.engines import chromium
-from sdf2vec.export import export, packing
+from sdf2vec.export import packing
 from sdf2vec.export.options import Options
 from sdf2vec.export.shader import shader
 from sdf2vec.expr import (

@@ -11,7 +11,6 @@ import torch
 import sdf2vec
 from sdf2vec import Layer, Scene, Sdf2vecError, Shape
 from sdf2vec.fit import loop, palette
-from sdf2vec.fit.constraints import MARGIN
 from sdf2vec.fit.loop import Fit, Progress, fit_picture
 from sdf2vec.fit.presets import MANY, PRESETS, Phase, Preset, Relocation
 from sdf2vec.fit.settings import Settings, preset_of, settings_of
@@ -21,6 +20,7 @@ from sdf2vec.metrics import mse
 from sdf2vec.render.fused import composite
 from sdf2vec.render.reference import render
 from sdf2vec.render.tensors import from_scene
+from sdf2vec.units import MARGIN
 
 from .test_constraints import measured
 from .test_fit import as_tensor, picture, remember

@@ -14,7 +14,7 @@ from sdf2vec.layer import PIXEL, Formula, P, Part, constant_row, is_flat, row_wi
 from sdf2vec.lower.torch import compile_torch
 from sdf2vec.render.reference import composite, render
 from sdf2vec.render.tensors import from_scene
-from sdf2vec.scene import loads
+from sdf2vec.scene_file import loads
 
 from .scenes import FAMILIES, random_layer_of, scene_of
 
