@@ -127,7 +127,7 @@ class Bins:
 
 def _bin(canvas: _Canvas, rows: Floats) -> Bins:
     module, count = canvas.module, len(canvas.kinds)
-    limits, ranges = np.empty((count, 5), np.float32), np.empty((count, 4), np.int64)
+    limits, ranges = np.empty((count, 4), np.float32), np.empty((count, 4), np.int64)
     place = (canvas.x, canvas.y, canvas.pixel, canvas.columns)
     most = module.measure(canvas.kinds, rows, *place, canvas.rows, limits, ranges)
     tiles, layers, spans = np.empty(most, np.int32), np.empty(most, np.int32), np.empty((most, 2), np.int32)

@@ -11,14 +11,16 @@ from functools import cache
 from types import ModuleType
 
 from .. import kernel_cache
-from ..expr import VEC4, Expr, components_of, scalarize, var, walk
-from ..layer import Formula, P, Structure
+from ..expr import VEC4, Expr, components_of, const, scalarize, var, walk
+from ..layer import NEVER, PIXEL, Formula, P, Structure
 from ..lower.numba import PREAMBLE, Block, backward, forward, scalar
 from ..templating import template
 
 TILE = 16  # pixels along a side of a tile, the block that kernels work on
 PIXELS = TILE * TILE
-
+FARTHEST = (
+    1.001 * (TILE - 1) / 2 * 2**0.5
+)  # from the centre of a tile to its farthest pixel centre, and rounding
 
 BELOW = var("below", VEC4)
 ROW_OPACITY = 1  # its place in a layer's row of numbers: `Formula.uniforms`
@@ -55,6 +57,16 @@ def carried(channels: int) -> tuple[Expr, ...]:
     return components_of(BELOW)[:channels]
 
 
+def culling(formula: Formula) -> tuple[Expr, ...]:
+    """The box beyond which a layer covers nothing; the distances at a tile's centre from which on it covers nothing
+    of the tile, and up to which it covers all in its own colours. Scalars.
+    """
+    *box, outer, inner, slope = formula.bounds()
+    around = slope * (FARTHEST * PIXEL)
+    fills = inner - around if formula.is_solid else const(-NEVER)
+    return tuple(scalar for expr in (*box, outer + around, fills) for scalar in scalarize(expr))
+
+
 def text(structures: tuple[Structure, ...], compositing: str, channels: int) -> str:
     """The whole module for layers of these structures and 3 or 4 channels of colour.
 
@@ -66,7 +78,7 @@ def text(structures: tuple[Structure, ...], compositing: str, channels: int) -> 
         parts += [
             f"# {formula}",
             *_both_ways(drawn(formula, f"layer{index}", compositing, channels), channels),
-            scalar(f"bounds{index}", formula.bounds(), (), formula.uniforms),
+            scalar(f"bounds{index}", culling(formula), (), formula.uniforms),
             scalar(f"distance{index}", scalarize(formula.distance), components_of(P), formula.uniforms),
         ]
     solid = solid_blocks(formulas, compositing, channels)
@@ -75,7 +87,6 @@ def text(structures: tuple[Structure, ...], compositing: str, channels: int) -> 
     driver = template("tiles.py.jinja").render(
         tile=TILE,
         pixels=PIXELS,
-        farthest=(TILE - 1) / 2 * 2**0.5,
         channels=channels,
         solid=[block.name if block else None for block in solid],
         opacity=ROW_OPACITY,
