@@ -15,7 +15,7 @@ import numpy as np
 import torch
 from torch.autograd.function import once_differentiable
 
-from ..arrays import BoolArray, Float32Array, Int32Array, IntArray
+from ..arrays import Float32Array, Int32Array, IntArray
 from ..blend import COMPOSITING
 from ..layer import Structure
 from ..threads import in_threads
@@ -44,8 +44,8 @@ def _canvas(tensors: SceneTensors, width: int, height: int, channels: int) -> tu
     module = kernels.load(structures, tensors.compositing, channels)
     order = _draw_order(tensors)
     index = np.repeat(np.arange(len(structures)), list(map(len, tensors.groups)))[order.numpy()]
-    solid, hides = kernels.solid_ones(structures)[index], COMPOSITING[tensors.compositing].hides
-    canvas = _Canvas(module, index, solid, channels, width, height, *axes, hides=hides)
+    hides = COMPOSITING[tensors.compositing].hides
+    canvas = _Canvas(module, index, channels, width, height, *axes, hides=hides)
     return canvas, rows_of(tensors.groups, float(axes[2]))[order]
 
 
@@ -95,7 +95,6 @@ class _Canvas:
 
     module: ModuleType
     kinds: IntArray  # [L]
-    solid: BoolArray  # [L] whether a layer can cover a tile in its own colours
     channels: int
     width: int
     height: int
@@ -131,7 +130,7 @@ def _bin(canvas: _Canvas, rows: Float32Array) -> Bins:
     pairs = tiling.list_candidates(bounds, ranges, *place, tiles, layers, spans, centers)
     distances = np.empty(pairs, np.float32)
     canvas.module.measure_distances(canvas.kinds, rows, layers, centers, distances)
-    pairs = tiling.keep_touching(pairs, distances, bounds, canvas.solid, canvas.pixel, tiles, layers, spans)
+    pairs = tiling.keep_touching(pairs, distances, bounds, tiles, layers, spans)
     starts = np.zeros(canvas.columns * canvas.rows + 1, np.int64)
     sorted_layers, sorted_spans = np.empty(pairs, np.int32), np.empty((pairs, 2), np.int32)
     tiling.sort_pairs(pairs, tiles, layers, spans, starts, sorted_layers, sorted_spans)
@@ -139,8 +138,8 @@ def _bin(canvas: _Canvas, rows: Float32Array) -> Bins:
 
 
 def _bounds(canvas: _Canvas, rows: Float32Array) -> Float32Array:
-    """The bounds of every layer [L, 7]: `layer.Formula.bounds`."""
-    bounds = np.empty((len(canvas.kinds), tiling.LIMITS), np.float32)
+    """The bounds of every layer [L, 6]: `kernels.culling`."""
+    bounds = np.empty((len(canvas.kinds), tiling.INNER + 1), np.float32)
     canvas.module.measure_bounds(canvas.kinds, rows, bounds)
     return bounds
 

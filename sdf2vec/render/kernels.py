@@ -10,15 +10,16 @@ from dataclasses import replace
 from functools import cache
 from types import ModuleType
 
-import numpy as np
-
 from .. import kernel_cache
-from ..arrays import BoolArray
-from ..expr import VEC4, Expr, components_of, scalarize, var, walk
-from ..layer import Formula, P, Structure
+from ..expr import VEC4, Expr, components_of, const, scalarize, var, walk
+from ..layer import NEVER, PIXEL, Formula, P, Structure
 from ..lower.numba import PREAMBLE, Block, backward, forward, scalar
 from ..templating import template
+from .tiling import TILE
 
+FARTHEST = (
+    1.001 * (TILE - 1) / 2 * 2**0.5
+)  # pixels from a tile's centre to its farthest pixel centre, and rounding
 BELOW = var("below", VEC4)
 
 
@@ -53,6 +54,16 @@ def carried(channels: int) -> tuple[Expr, ...]:
     return components_of(BELOW)[:channels]
 
 
+def culling(formula: Formula) -> tuple[Expr, ...]:
+    """The box beyond which a layer covers nothing; the distances at a tile's centre from which on it covers nothing
+    of the tile, and up to which it covers all in its own colours. Scalars.
+    """
+    *box, outer, inner, slope = formula.bounds()
+    around = slope * (FARTHEST * PIXEL)
+    fills = inner - around if formula.is_solid else const(-NEVER)
+    return tuple(scalar for expr in (*box, outer + around, fills) for scalar in scalarize(expr))
+
+
 def text(structures: tuple[Structure, ...], compositing: str, channels: int) -> str:
     """The whole module for layers of these structures and 3 or 4 channels of colour.
 
@@ -64,7 +75,7 @@ def text(structures: tuple[Structure, ...], compositing: str, channels: int) -> 
         parts += [
             f"# {formula}",
             *_both_ways(drawn(formula, f"layer{index}", compositing, channels), channels),
-            scalar(f"bounds{index}", formula.bounds(), (), formula.uniforms),
+            scalar(f"bounds{index}", culling(formula), (), formula.uniforms),
             scalar(f"distance{index}", scalarize(formula.distance), components_of(P), formula.uniforms),
         ]
     solid = solid_blocks(formulas, compositing, channels)
@@ -73,12 +84,6 @@ def text(structures: tuple[Structure, ...], compositing: str, channels: int) -> 
     names = [block.name if block else None for block in solid]
     driver = template("tiles.py.jinja").render(channels=channels, solid=names)
     return "\n\n".join([*parts, driver])
-
-
-@cache
-def solid_ones(structures: tuple[Structure, ...]) -> BoolArray:
-    """Whether layers of each structure can cover a region in their own colours, [structures]."""
-    return np.array([Formula.of(structure).is_solid for structure in structures])
 
 
 def _both_ways(block: Block, channels: int) -> tuple[str, str]:

@@ -10,10 +10,8 @@ from ..lower.numba_math import ONE, ZERO, f32
 
 TILE = 16  # pixels along a side of a tile, the block that kernels work on
 PIXELS = TILE * TILE
-FARTHEST = f32((TILE - 1) / 2 * 2**0.5)  # pixels from the centre of a tile to its farthest pixel centre
 MIDDLE = f32((TILE - 1) / 2)  # pixels from the first pixel of a tile to its centre
-LOW_X, LOW_Y, HIGH_X, HIGH_Y, OUTER, INNER, SLOPE = range(7)  # columns of bounds: `layer.Formula.bounds`
-LIMITS = 7
+LOW_X, LOW_Y, HIGH_X, HIGH_Y, OUTER, INNER = range(6)  # columns of bounds: `kernels.culling`
 
 
 @kernel
@@ -54,16 +52,15 @@ def list_candidates(bounds, ranges, x, y, pixel, columns, tiles, layers, spans, 
 
 
 @kernel
-def keep_touching(count, distances, bounds, solid, pixel, tiles, layers, spans):
+def keep_touching(count, distances, bounds, tiles, layers, spans):
     """Keeps, in place, the pairs whose layer covers some of the tile, by its distance at the tile's centre; returns
-    how many. Rows become (0, 0) where a layer that is `solid` [L] covers all of the tile."""
+    how many. Rows become (0, 0) where a layer covers all of the tile."""
     kept = 0
     for i in range(count):
         layer = layers[i]
-        around = FARTHEST * pixel * bounds[layer, SLOPE] * f32(1.001)
-        if distances[i] - around < bounds[layer, OUTER]:
+        if distances[i] < bounds[layer, OUTER]:
             tiles[kept], layers[kept] = tiles[i], layer
-            covered = solid[layer] and distances[i] + around < bounds[layer, INNER]
+            covered = distances[i] < bounds[layer, INNER]
             spans[kept, 0] = 0 if covered else spans[i, 0]
             spans[kept, 1] = 0 if covered else spans[i, 1]
             kept += 1

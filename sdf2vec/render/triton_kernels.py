@@ -14,7 +14,7 @@ from ..layer import Formula, P, Structure
 from ..lower.block import Block
 from ..lower.triton import PREAMBLE, backward, forward
 from ..templating import template
-from .kernels import carried, drawn, solid_blocks
+from .kernels import carried, culling, drawn, solid_blocks
 from .tiling import PIXELS, TILE
 
 MEASURED = 64  # tiles whose distance from a layer is looked at at once
@@ -32,7 +32,7 @@ def text(structures: tuple[Structure, ...], compositing: str, channels: int) -> 
         parts += [
             f"# {formula}",
             *_both_ways(drawn(formula, f"layer{index}", compositing, channels), channels),
-            forward(Block(f"bounds{index}", formula.bounds(), (), row), rows=True),
+            forward(Block(f"bounds{index}", culling(formula), (), row), rows=True),
             forward(Block(f"distance{index}", scalarize(formula.distance), components_of(P), row), rows=True),
         ]
     solid = solid_blocks(formulas, compositing, channels)
@@ -41,7 +41,6 @@ def text(structures: tuple[Structure, ...], compositing: str, channels: int) -> 
     driver = template("tiles.triton.jinja").render(
         tile=TILE,
         pixels=PIXELS,
-        farthest=(TILE - 1) / 2 * 2**0.5,
         channels=channels,
         solid=[block.name if block else None for block in solid],
         row=max(len(formula.uniforms) for formula in formulas),
