@@ -30,7 +30,7 @@ from ..scene import Joint, Layer, Scene, Shape
 from ..shapes import KINDS
 from ..threads import threads_of_its_own
 from ..units import ANGLE, COLOR_DECIMALS, FREQUENCY, GEOMETRY_DECIMALS, Fractions, Parameter
-from .records import Variant, joins_of, variant_of, variants_of
+from .records import Variant, first_records, joins_of, variant_of, variants_of
 from .tiles import Grid, layer_bounds
 
 LIMIT = 0.95  # 8-bit levels: largest error of the picture; drawing adds less than 0.05
@@ -466,7 +466,7 @@ def _cell_boxes(scene: Scene, slack: float) -> tuple[Grid, list[tuple[int, int, 
     """A grid that holds everything, and the cells (low x, low y, high x, high y) that each layer may touch."""
     if not scene.layers:
         return Grid(1, 1, 1.0, (0.0, 0.0)), []
-    boxes = layer_bounds(scene, slack).boxes
+    boxes = _boxes(scene, slack)
     low, high = boxes[:, :2].min(axis=0), boxes[:, 2:].max(axis=0)
     size = float((high - low).max()) * (1.0 + 1e-5)
     corner = (_rounded(low[0] - 2e-6 * size), _rounded(low[1] - 2e-6 * size))
@@ -475,6 +475,16 @@ def _cell_boxes(scene: Scene, slack: float) -> tuple[Grid, list[tuple[int, int, 
     places = np.floor((boxes - np.array([*corner, *corner])) * per_unit + [-1e-4, -1e-4, 1e-4, 1e-4])
     clipped = np.clip(places, 0, CELLS - 1).astype(int).tolist()
     return grid, [(a, b, c, d) for a, b, c, d in clipped]
+
+
+def _boxes(scene: Scene, slack: float) -> NDArray[np.float64]:
+    """For each layer a box that holds its coverage, and its shapes, also those that only take away; [L, 4]."""
+    boxes, firsts = layer_bounds(scene, slack).boxes, first_records(scene.layers)
+    alone = (Layer((shape,), layer.falloff) for layer in scene.layers for shape in layer.shapes)
+    shapes = layer_bounds(replace(scene, layers=tuple(alone)), slack).boxes
+    low = np.minimum(boxes[:, :2], np.minimum.reduceat(shapes[:, :2], firsts))
+    high = np.maximum(boxes[:, 2:], np.maximum.reduceat(shapes[:, 2:], firsts))
+    return np.concatenate([low, high], axis=1)
 
 
 def _rounded(value: float) -> float:
