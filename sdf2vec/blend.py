@@ -10,10 +10,6 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 from .expr import (
-    FLOAT,
-    VEC2,
-    VEC3,
-    VEC4,
     Expr,
     Function,
     absolute,
@@ -31,6 +27,7 @@ from .expr import (
     sin,
     vec4,
 )
+from .operation import FLOAT, VEC2, VEC3, VEC4
 
 # --- falloff ------------------------------------------------------------------------------------------------
 

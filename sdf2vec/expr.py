@@ -14,31 +14,29 @@ that keep NaN away (a square root at zero, ties of `min`) are made in its rows a
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Container, Hashable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Hashable
 from dataclasses import dataclass
-from enum import Enum
 from functools import partial
 from weakref import WeakValueDictionary
 
-
-class Type(Enum):
-    """Type of an expression; the value is its GLSL name."""
-
-    BOOL = "bool"
-    FLOAT = "float"
-    VEC2 = "vec2"
-    VEC3 = "vec3"
-    VEC4 = "vec4"
-
-    @property
-    def width(self) -> int:
-        """Number of scalar components."""
-        return {"vec2": 2, "vec3": 3, "vec4": 4}.get(self.value, 1)
-
-
-BOOL, FLOAT, VEC2, VEC3, VEC4 = Type
-VECTOR = {1: FLOAT, 2: VEC2, 3: VEC3, 4: VEC4}
-COMPONENTS = "xyzw"
+from .operation import (
+    CALL,
+    FLOAT,
+    PRECEDENCE,
+    Cell,
+    Operation,
+    Type,
+    arithmetic,
+    blended,
+    both,
+    call,
+    chosen,
+    compared,
+    equal,
+    joined,
+    reduced,
+    widest,
+)
 
 
 class Expr:
@@ -111,7 +109,7 @@ Operand = Expr | float
 _nodes: WeakValueDictionary[tuple[object, ...], Expr] = WeakValueDictionary()
 
 
-def _node(op: str, args: tuple[Expr, ...], type: Type, payload: Hashable = None) -> Expr:
+def node(op: str, args: tuple[Expr, ...], type: Type, payload: Hashable = None) -> Expr:
     key = (op, args, type, payload)
     found = _nodes.get(key)
     if found is None:
@@ -126,7 +124,7 @@ def const(value: float) -> Expr:
     """A float constant; it must be finite. −0 becomes 0."""
     if not math.isfinite(value):
         raise ValueError(f"a constant must be finite, got {value}")
-    return _node("const", (), FLOAT, float(value) + 0.0)
+    return node("const", (), FLOAT, float(value) + 0.0)
 
 
 def constant(expr: Expr) -> float:
@@ -137,12 +135,12 @@ def constant(expr: Expr) -> float:
 
 def var(name: str, type: Type = FLOAT) -> Expr:
     """A named input."""
-    return _node("var", (), type, name)
+    return node("var", (), type, name)
 
 
 def let(name: str, value: Expr) -> Expr:
     """`value`, which shader text shall compute as a local variable of this name."""
-    return _node("let", (value,), value.type, name)
+    return node("let", (value,), value.type, name)
 
 
 # --- functions ----------------------------------------------------------------------------------------------
@@ -162,7 +160,7 @@ class Function:
         expected = [parameter.type for parameter in self.parameters]
         if [arg.type for arg in given] != expected:
             raise TypeError(f"{self.name} takes {expected}, got {[arg.type for arg in given]}")
-        return _node("call", given, self.body.type, self)
+        return node("call", given, self.body.type, self)
 
 
 def function(name: str, **types: Type) -> Callable[[Callable[..., Expr]], Function]:
@@ -176,97 +174,6 @@ def function(name: str, **types: Type) -> Callable[[Callable[..., Expr]], Functi
 
 
 # --- the table of operations --------------------------------------------------------------------------------
-
-CALL = 100
-PRECEDENCE = {"?": 1, "<": 3, "+": 5, "-": 5, "*": 6, "/": 6, "unary": 8}
-
-
-@dataclass(frozen=True)
-class Cell:
-    """How a shader language spells an operation: a format text, how tightly it binds, and how tightly its
-    operands must bind (as tightly as itself, when not said)."""
-
-    text: str
-    precedence: int = CALL
-    operands: int = 0
-
-
-@dataclass(frozen=True)
-class Operation:
-    """One row: types, spelling per target, value on constants, derivative.
-
-    A row either has a text for every target, `value` and `partials` (it works on floats; vectors go by
-    component) or `expand` (other rows define it once its arguments are split into components).
-    """
-
-    result: Callable[[Sequence[Type]], Type]
-    glsl: Cell
-    wgsl: Cell
-    torch: str | None = None
-    numba: str | None = None
-    triton: str | None = None
-    javascript: str | None = None
-    value: Callable[..., float] | None = None
-    partials: Callable[..., tuple[Operand | None, ...]] | None = None
-    expand: Callable[..., tuple[Expr, ...]] | None = None
-    domain: str = "all"
-
-
-def _widest(types: Sequence[Type]) -> Type:
-    """Floats broadcast to the one vector type present."""
-    vectors = {type for type in types if type.width > 1}
-    if len(vectors) > 1 or BOOL in types:
-        raise TypeError(f"types do not fit: {[type.value for type in types]}")
-    return vectors.pop() if vectors else FLOAT
-
-
-def _equal(types: Sequence[Type]) -> Type:
-    if len(set(types)) > 1 or BOOL in types:
-        raise TypeError(f"types must be equal: {[type.value for type in types]}")
-    return types[0]
-
-
-def _compared(types: Sequence[Type]) -> Type:
-    if set(types) != {FLOAT}:
-        raise TypeError(f"only floats compare, got {[type.value for type in types]}")
-    return BOOL
-
-
-def _chosen(types: Sequence[Type]) -> Type:
-    if types[0] is not BOOL:
-        raise TypeError("select takes a bool first")
-    return _equal(types[1:])
-
-
-def _blended(types: Sequence[Type]) -> Type:
-    if types[2] is not FLOAT:
-        raise TypeError("mix takes a float last")
-    return _equal(types[:2])
-
-
-def _reduced(types: Sequence[Type]) -> Type:
-    if _equal(types).width == 1:
-        raise TypeError("takes vectors")
-    return FLOAT
-
-
-def _joined(width: int, types: Sequence[Type]) -> Type:
-    if list(types) != [FLOAT] and sum(type.width for type in types) != width:
-        raise TypeError(f"{width} components wanted, got {[type.value for type in types]}")
-    return VECTOR[width]
-
-
-def _arithmetic(symbol: str) -> Cell:
-    return Cell(f"{{0}} {symbol} {{1}}", PRECEDENCE[symbol])
-
-
-def _call(name: str, arity: int = 1) -> Cell:
-    return Cell(f"{name}({', '.join(f'{{{i}}}' for i in range(arity))})")
-
-
-def _both(cell: Cell) -> tuple[Cell, Cell]:
-    """GLSL and WGSL agree."""
-    return cell, cell
 
 
 def _sigmoid(x: float) -> float:
@@ -300,7 +207,7 @@ def _clamp(x: tuple[Expr, ...], low: tuple[Expr, ...], high: tuple[Expr, ...]) -
 
 def _vector(width: int) -> Operation:
     return Operation(
-        partial(_joined, width),
+        partial(joined, width),
         Cell(f"vec{width}({{*}})"),
         Cell(f"vec{width}f({{*}})"),
         expand=partial(_join, width),
@@ -313,8 +220,8 @@ _SQRT = "torch.where({0} > 0, torch.sqrt(torch.where({0} > 0, {0}, 1.0)), 0.0)"
 # Ties: min and max return (and pass the gradient to) their second argument, abs counts 0 as positive.
 OPERATIONS: dict[str, Operation] = {
     "add": Operation(
-        _widest,
-        *_both(_arithmetic("+")),
+        widest,
+        *both(arithmetic("+")),
         torch="{0} + {1}",
         numba="{0} + {1}",
         triton="{0} + {1}",
@@ -323,8 +230,8 @@ OPERATIONS: dict[str, Operation] = {
         partials=lambda a, b, y: (1.0, 1.0),
     ),
     "sub": Operation(
-        _widest,
-        *_both(_arithmetic("-")),
+        widest,
+        *both(arithmetic("-")),
         torch="{0} - {1}",
         numba="{0} - {1}",
         triton="{0} - {1}",
@@ -333,8 +240,8 @@ OPERATIONS: dict[str, Operation] = {
         partials=lambda a, b, y: (1.0, -1.0),
     ),
     "mul": Operation(
-        _widest,
-        *_both(_arithmetic("*")),
+        widest,
+        *both(arithmetic("*")),
         torch="{0} * {1}",
         numba="{0} * {1}",
         triton="{0} * {1}",
@@ -343,8 +250,8 @@ OPERATIONS: dict[str, Operation] = {
         partials=lambda a, b, y: (b, a),
     ),
     "div": Operation(
-        _widest,
-        *_both(_arithmetic("/")),
+        widest,
+        *both(arithmetic("/")),
         torch="{0} / {1}",
         numba="{0} / {1}",
         triton="{0} / {1}",
@@ -354,8 +261,8 @@ OPERATIONS: dict[str, Operation] = {
         domain="divisor not 0: whoever divides keeps it away from 0",
     ),
     "neg": Operation(
-        _widest,
-        *_both(Cell("-{0}", PRECEDENCE["unary"])),
+        widest,
+        *both(Cell("-{0}", PRECEDENCE["unary"])),
         torch="-{0}",
         numba="-{0}",
         triton="-{0}",
@@ -364,8 +271,8 @@ OPERATIONS: dict[str, Operation] = {
         partials=lambda a, y: (-1.0,),
     ),
     "abs": Operation(
-        _widest,
-        *_both(_call("abs")),
+        widest,
+        *both(call("abs")),
         torch="torch.where({0} < 0, -{0}, {0})",
         numba="({0} if {0} > ZERO else -{0})",
         triton="tl.abs({0})",
@@ -374,8 +281,8 @@ OPERATIONS: dict[str, Operation] = {
         partials=lambda a, y: (select(a < 0.0, -1.0, 1.0),),
     ),
     "min": Operation(
-        _equal,
-        *_both(_call("min", 2)),
+        equal,
+        *both(call("min", 2)),
         torch="torch.where({0} < {1}, {0}, {1})",
         numba="({0} if {0} < {1} else {1})",
         triton="tl.minimum({0}, {1})",
@@ -384,8 +291,8 @@ OPERATIONS: dict[str, Operation] = {
         partials=lambda a, b, y: (select(a < b, 1.0, 0.0), select(a < b, 0.0, 1.0)),
     ),
     "max": Operation(
-        _equal,
-        *_both(_call("max", 2)),
+        equal,
+        *both(call("max", 2)),
         torch="torch.where({0} > {1}, {0}, {1})",
         numba="({0} if {0} > {1} else {1})",
         triton="tl.maximum({0}, {1})",
@@ -393,10 +300,10 @@ OPERATIONS: dict[str, Operation] = {
         value=max,
         partials=lambda a, b, y: (select(a > b, 1.0, 0.0), select(a > b, 0.0, 1.0)),
     ),
-    "clamp": Operation(_equal, *_both(_call("clamp", 3)), expand=_clamp, domain="low not above high"),
+    "clamp": Operation(equal, *both(call("clamp", 3)), expand=_clamp, domain="low not above high"),
     "sqrt": Operation(
-        _widest,
-        *_both(_call("sqrt")),
+        widest,
+        *both(call("sqrt")),
         torch=_SQRT,
         numba="sqrt({0} if {0} > ZERO else ZERO)",
         triton="tl.sqrt(tl.maximum({0}, 0.0))",
@@ -406,8 +313,8 @@ OPERATIONS: dict[str, Operation] = {
         domain="not below 0; the derivative at 0 is 0",
     ),
     "exp": Operation(
-        _widest,
-        *_both(_call("exp")),
+        widest,
+        *both(call("exp")),
         torch="torch.exp({0})",
         numba="fast_exp({0})",
         triton="tl.exp({0})",
@@ -417,8 +324,8 @@ OPERATIONS: dict[str, Operation] = {
         domain="at most 80, so that float32 holds it",
     ),
     "log": Operation(
-        _widest,
-        *_both(Cell("log(max({0}, 1e-30))")),
+        widest,
+        *both(Cell("log(max({0}, 1e-30))")),
         torch="torch.log(torch.where({0} > 1e-30, {0}, 1e-30))",
         numba="fast_log({0})",
         triton="tl.log(tl.maximum({0}, 1e-30))",
@@ -428,8 +335,8 @@ OPERATIONS: dict[str, Operation] = {
         domain="below 1e-30 it stays what it is there",
     ),
     "sin": Operation(
-        _widest,
-        *_both(_call("sin")),
+        widest,
+        *both(call("sin")),
         torch="torch.sin({0})",
         numba="fast_sin({0})",
         triton="tl.sin({0})",
@@ -439,8 +346,8 @@ OPERATIONS: dict[str, Operation] = {
         domain="a few hundred radians, beyond which float32 loses the phase",
     ),
     "cos": Operation(
-        _widest,
-        *_both(_call("cos")),
+        widest,
+        *both(call("cos")),
         torch="torch.cos({0})",
         numba="fast_sin({0} + QUARTER)",
         triton="tl.cos({0})",
@@ -450,8 +357,8 @@ OPERATIONS: dict[str, Operation] = {
         domain="a few hundred radians, beyond which float32 loses the phase",
     ),
     "sigmoid": Operation(
-        _widest,
-        *_both(_SIGMOID),
+        widest,
+        *both(_SIGMOID),
         torch="torch.sigmoid({0})",
         numba="fast_sigmoid({0})",
         triton="1.0 / (1.0 + tl.exp(tl.minimum(-{0}, 80.0)))",
@@ -460,8 +367,8 @@ OPERATIONS: dict[str, Operation] = {
         partials=lambda a, y: (y * (1.0 - y),),
     ),
     "less": Operation(
-        _compared,
-        *_both(_arithmetic("<")),
+        compared,
+        *both(arithmetic("<")),
         torch="{0} < {1}",
         numba="{0} < {1}",
         triton="{0} < {1}",
@@ -470,7 +377,7 @@ OPERATIONS: dict[str, Operation] = {
         partials=lambda a, b, y: (None, None),
     ),
     "select": Operation(
-        _chosen,
+        chosen,
         Cell("{0} ? {1} : {2}", PRECEDENCE["?"]),
         Cell("select({2}, {1}, {0})"),
         torch="torch.where({0}, {1}, {2})",
@@ -481,8 +388,8 @@ OPERATIONS: dict[str, Operation] = {
         partials=lambda condition, a, b, y: (None, select(condition, 1.0, 0.0), select(condition, 0.0, 1.0)),
     ),
     "fixed": Operation(
-        _widest,
-        *_both(Cell("{0}", PRECEDENCE["unary"], operands=CALL)),
+        widest,
+        *both(Cell("{0}", PRECEDENCE["unary"], operands=CALL)),
         torch="{0}.detach()",
         numba="{0}",
         triton="{0}",
@@ -491,9 +398,9 @@ OPERATIONS: dict[str, Operation] = {
         partials=lambda a, y: (None,),
         domain="its derivative counts as 0",
     ),
-    "mix": Operation(_blended, *_both(_call("mix", 3)), expand=_mix),
-    "dot": Operation(_reduced, *_both(_call("dot", 2)), expand=_dot),
-    "length": Operation(_reduced, *_both(_call("length")), expand=_length),
+    "mix": Operation(blended, *both(call("mix", 3)), expand=_mix),
+    "dot": Operation(reduced, *both(call("dot", 2)), expand=_dot),
+    "length": Operation(reduced, *both(call("length")), expand=_length),
     "vec2": _vector(2),
     "vec3": _vector(3),
     "vec4": _vector(4),
@@ -512,7 +419,7 @@ def operation(op: str, *args: Operand) -> Expr:
     if row.value and type is FLOAT and all(arg.op == "const" for arg in given):
         return const(row.value(*(constant(arg) for arg in given)))
     simple = _SIMPLIFY[op](*given) if op in _SIMPLIFY else None
-    return simple if simple is not None and simple.type is type else _node(op, given, type)
+    return simple if simple is not None and simple.type is type else node(op, given, type)
 
 
 def _is(expr: Expr, value: float) -> bool:
@@ -674,145 +581,4 @@ def component(v: Expr, index: int) -> Expr:
         raise TypeError(f"{v.type.value} has no component {index}")
     if v.op == f"vec{v.type.width}" and len(v.args) == v.type.width:
         return v.args[index]
-    return _node("component", (v,), FLOAT, index)
-
-
-# --- walking ------------------------------------------------------------------------------------------------
-
-
-def walk(roots: Iterable[Expr]) -> Iterator[Expr]:
-    """Every node once, arguments before what uses them."""
-    seen: set[Expr] = set()
-    stack = [(root, False) for root in reversed(list(roots))]
-    while stack:
-        node, ready = stack.pop()
-        if node in seen:
-            continue
-        if ready:
-            seen.add(node)
-            yield node
-        else:
-            stack.append((node, True))
-            stack.extend((arg, False) for arg in reversed(node.args))
-
-
-def substitute(expr: Expr, values: Mapping[Expr, Expr]) -> Expr:
-    """The expression with the nodes that are keys of `values` replaced; it folds anew."""
-    done: dict[Expr, Expr] = {}
-    for node in walk([expr]):
-        done[node] = values.get(node) or _rebuild(node, tuple(done[arg] for arg in node.args))
-    return done[expr]
-
-
-def _rebuild(node: Expr, args: tuple[Expr, ...]) -> Expr:
-    if args == node.args:
-        return node
-    if node.op in OPERATIONS:
-        return operation(node.op, *args)
-    if node.op == "component":
-        assert isinstance(node.payload, int)
-        return component(args[0], node.payload)
-    return _node(node.op, args, node.type, node.payload)
-
-
-def hoist(expr: Expr, varying: Container[Expr]) -> list[Expr]:
-    """The largest parts of `expr`, constants aside, that do not depend on what is `varying`, in a fixed order.
-
-    They can be computed once and replaced by table entries. Calls are looked at from outside only.
-    """
-    depends: set[Expr] = set()
-    candidates: list[Expr] = []
-    for node in walk([expr]):
-        if node in varying or any(arg in depends for arg in node.args):
-            depends.add(node)
-            candidates += [arg for arg in node.args if arg not in depends and arg.op != "const"]
-    return list(dict.fromkeys(candidates))
-
-
-def scalarize(expr: Expr) -> tuple[Expr, ...]:
-    """The same value as one float (or bool) expression per component: no vectors, calls or lets remain.
-
-    A vector variable `p` becomes the floats `p_x`, `p_y`, …
-    """
-    return _scalarize(expr, {})
-
-
-def components_of(variable: Expr) -> tuple[Expr, ...]:
-    """The float variables that stand for a variable's components after `scalarize`."""
-    if variable.type.width == 1:
-        return (variable,)
-    return tuple(var(f"{variable.payload}_{c}") for c in COMPONENTS[: variable.type.width])
-
-
-Split = tuple[Expr, ...]
-
-
-def _scalarize(root: Expr, bindings: Mapping[Expr, Split]) -> Split:
-    done: dict[Expr, Split] = {}
-    for node in walk([root]):
-        parts = [done[arg] for arg in node.args]
-        done[node] = _SPLIT.get(node.op, _split_operation)(node, parts, bindings)
-    return done[root]
-
-
-def _split_leaf(node: Expr, parts: list[Split], bindings: Mapping[Expr, Split]) -> Split:
-    return bindings[node] if node in bindings else components_of(node)
-
-
-def _split_const(node: Expr, parts: list[Split], bindings: Mapping[Expr, Split]) -> Split:
-    return (node,)
-
-
-def _split_let(node: Expr, parts: list[Split], bindings: Mapping[Expr, Split]) -> Split:
-    return parts[0]
-
-
-def _split_component(node: Expr, parts: list[Split], bindings: Mapping[Expr, Split]) -> Split:
-    assert isinstance(node.payload, int)
-    return (parts[0][node.payload],)
-
-
-def _split_call(node: Expr, parts: list[Split], bindings: Mapping[Expr, Split]) -> Split:
-    assert isinstance(node.payload, Function)
-    return _scalarize(node.payload.body, dict(zip(node.payload.parameters, parts, strict=True)))
-
-
-def _split_operation(node: Expr, parts: list[Split], bindings: Mapping[Expr, Split]) -> Split:
-    row = OPERATIONS[node.op]
-    if row.expand:
-        return row.expand(*parts)
-    width = node.type.width
-    aligned = [part * width if len(part) == 1 else part for part in parts]
-    return tuple(operation(node.op, *column) for column in zip(*aligned, strict=True))
-
-
-_SPLIT: dict[str, Callable[[Expr, list[Split], Mapping[Expr, Split]], Split]] = {
-    "var": _split_leaf,
-    "const": _split_const,
-    "let": _split_let,
-    "component": _split_component,
-    "call": _split_call,
-}
-
-
-# --- derivatives --------------------------------------------------------------------------------------------
-
-
-def gradient(output: Expr, variables: Sequence[Expr]) -> tuple[Expr, ...]:
-    """Derivatives of a scalarized float expression by float variables, in one backward pass."""
-    found = adjoints({output: const(1.0)})
-    return tuple(found.get(variable, const(0.0)) for variable in variables)
-
-
-def adjoints(seeds: Mapping[Expr, Expr], leaves: Container[Expr] = ()) -> dict[Expr, Expr]:
-    """Derivatives of Σ seed·node by every float node below, of scalarized nodes; `leaves` are not entered."""
-    found: dict[Expr, Expr] = dict(seeds)
-    for node in reversed(list(walk(seeds))):
-        if node not in found or not node.args or node in leaves:
-            continue
-        partials = OPERATIONS[node.op].partials
-        assert partials is not None, f"{node.op} must be scalarized first"
-        for arg, slope in zip(node.args, partials(*node.args, node), strict=True):
-            if slope is not None:
-                found[arg] = found.get(arg, const(0.0)) + found[node] * slope
-    return found
+    return node("component", (v,), FLOAT, index)

@@ -17,19 +17,9 @@ from functools import cached_property
 from typing import NamedTuple
 
 from .blend import COMPOSITING, JOINS, coverage, reach, saturation, union_reach
-from .expr import (
-    VEC2,
-    Expr,
-    Operand,
-    const,
-    let,
-    maximum,
-    minimum,
-    scalarize,
-    var,
-    vec3,
-    vec4,
-)
+from .expr import Expr, Operand, const, let, maximum, minimum, var, vec3, vec4
+from .graph import scalarize
+from .operation import VEC2
 from .paints import FLAT, PAINTS, Paint
 from .shapes import KINDS, Kind
 from .units import FALLOFF, OPACITY, SMOOTHNESS, Parameter

@@ -10,7 +10,8 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import NamedTuple
 
-from .expr import VEC2, VEC3, Expr, clamp, dot, function, mix
+from .expr import Expr, clamp, dot, function, mix
+from .operation import VEC2, VEC3
 from .units import COLOR, DIRECTION, Parameter
 
 

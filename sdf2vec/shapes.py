@@ -13,8 +13,6 @@ from dataclasses import dataclass
 
 from .blend import CUTOFF
 from .expr import (
-    FLOAT,
-    VEC2,
     Expr,
     absolute,
     clamp,
@@ -34,9 +32,9 @@ from .expr import (
     vec2,
     vec4,
 )
+from .operation import FLOAT, VEC2
+from .outlines import EllipseOutline, Outline, Point, PolygonOutline, RectangleOutline
 from .units import ANGLE, FREQUENCY, LENGTH, POSITION, Parameter
-
-Point = tuple[float, float]
 
 PATCH_REACH = math.sqrt(
     2.0 * math.log(1.0 / CUTOFF)
@@ -44,39 +42,6 @@ PATCH_REACH = math.sqrt(
 PIXEL_VARIANCE = 1.0 / 12.0  # of a box of one pixel
 SMALLEST = 1e-6  # scene units; keeps divisors away from 0 at zero size
 TINY = 1e-20  # the same for squared lengths
-
-
-# --- outlines: what a vector format draws for the contour `distance = offset` -------------------------------
-
-
-@dataclass(frozen=True)
-class EllipseOutline:
-    """An ellipse about `center` with its own axes turned by `angle`."""
-
-    center: Point
-    radii: Point
-    angle: float = 0.0
-
-
-@dataclass(frozen=True)
-class RectangleOutline:
-    """A rectangle of `half_size` about `center`, turned by `angle`, with rounded corners."""
-
-    center: Point
-    half_size: Point
-    angle: float
-    corner_radius: float
-
-
-@dataclass(frozen=True)
-class PolygonOutline:
-    """A polygon grown by `rounding` on all sides, which rounds its corners."""
-
-    points: tuple[Point, ...]
-    rounding: float
-
-
-Outline = EllipseOutline | RectangleOutline | PolygonOutline
 
 
 # --- declarations -------------------------------------------------------------------------------------------

@@ -10,7 +10,9 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, NamedTuple
 
-from .expr import FLOAT, VECTOR, Expr, Type, components_of, const, function, length, let, operation, var
+from .expr import Expr, const, function, length, let, operation, var
+from .graph import components_of
+from .operation import FLOAT, VECTOR, Type
 
 LONGEST_CANVAS = 65536.0  # scene units: the longest canvas there can be; anything larger is a mistake
 MARGIN = 0.3  # scene units that a position may leave the canvas by

@@ -20,21 +20,10 @@ from sdf2vec.blend import (
     scene_point,
     union_reach,
 )
-from sdf2vec.expr import (
-    VEC2,
-    VEC3,
-    VEC4,
-    Expr,
-    components_of,
-    const,
-    constant,
-    gradient,
-    scalarize,
-    var,
-    vec3,
-    vec4,
-)
+from sdf2vec.expr import Expr, const, constant, var, vec3, vec4
+from sdf2vec.graph import components_of, gradient, scalarize
 from sdf2vec.lower.torch import compile_torch
+from sdf2vec.operation import VEC2, VEC3, VEC4
 
 d, falloff, pixel, k = var("d"), var("falloff"), var("pixel"), var("k")
 

@@ -9,7 +9,8 @@ import sdf2vec
 from sdf2vec import Scene
 from sdf2vec.engines import chromium
 from sdf2vec.engines.pages import ELEMENT
-from sdf2vec.expr import scalarize, var
+from sdf2vec.expr import var
+from sdf2vec.graph import scalarize
 from sdf2vec.lower.javascript import function_text
 from sdf2vec.render import reference
 from sdf2vec.scene_file import dumps

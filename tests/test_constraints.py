@@ -7,9 +7,11 @@ import pytest
 import torch
 
 from sdf2vec import Layer, Scene, Shape
-from sdf2vec.expr import VEC2, components_of, var
+from sdf2vec.expr import var
 from sdf2vec.fit.constraints import areas_of, enforce_min_thickness, too_small
+from sdf2vec.graph import components_of
 from sdf2vec.lower.torch import compile_torch
+from sdf2vec.operation import VEC2
 from sdf2vec.render.tensors import SceneTensors, from_scene
 from sdf2vec.shapes import KINDS
 

@@ -7,32 +7,25 @@ import pytest
 import torch
 
 from sdf2vec.expr import (
-    BOOL,
-    FLOAT,
     OPERATIONS,
-    VEC2,
-    VEC3,
     clamp,
     const,
     constant,
     fixed,
     function,
-    gradient,
-    hoist,
     length,
     let,
     maximum,
     mix,
     operation,
-    scalarize,
     select,
     sin,
-    substitute,
     var,
     vec2,
-    walk,
 )
+from sdf2vec.graph import gradient, hoist, scalarize, substitute, walk
 from sdf2vec.lower.torch import compile_torch
+from sdf2vec.operation import BOOL, FLOAT, VEC2, VEC3
 
 from .operations import MEANINGS, SMOOTH, expected
 

@@ -18,7 +18,6 @@ from sdf2vec.export import packing
 from sdf2vec.export.options import Options
 from sdf2vec.export.shader import shader
 from sdf2vec.expr import (
-    VEC4,
     Expr,
     absolute,
     cos,
@@ -38,6 +37,7 @@ from sdf2vec.fit.initialization import Layers, place
 from sdf2vec.fit.loop import adam
 from sdf2vec.fit.presets import Start
 from sdf2vec.layer import Part
+from sdf2vec.operation import VEC4
 from sdf2vec.paints import PAINTS, Paint
 from sdf2vec.render import culled, fused, reference, triton_fused
 from sdf2vec.render.tensors import from_scene, to_scene

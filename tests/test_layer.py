@@ -9,7 +9,7 @@ from scipy.special import expit, logsumexp
 
 from sdf2vec import Joint, Layer, Scene, Shape
 from sdf2vec.blend import COMPOSITING
-from sdf2vec.expr import components_of
+from sdf2vec.graph import components_of
 from sdf2vec.layer import PIXEL, Formula, P, Part, constant_row, is_flat, row_width, slots
 from sdf2vec.lower.torch import compile_torch
 from sdf2vec.render.reference import composite, render

@@ -8,10 +8,12 @@ import torch
 
 from sdf2vec import kernel_cache
 from sdf2vec.engines import ENGINES
-from sdf2vec.expr import FLOAT, OPERATIONS, VEC2, const, function, let, scalarize, select, sigmoid, var, vec2
+from sdf2vec.expr import OPERATIONS, const, function, let, select, sigmoid, var, vec2
+from sdf2vec.graph import scalarize
 from sdf2vec.lower import numba as numba_lowering
 from sdf2vec.lower.shader import GLSL, WGSL, definition, expression, literal, statements, used_functions
 from sdf2vec.lower.torch import compile_torch, source
+from sdf2vec.operation import FLOAT, VEC2
 
 from .operations import MEANINGS, expected
 

@@ -7,9 +7,11 @@ import pytest
 import torch
 
 from sdf2vec import Layer, Scene, Shape
-from sdf2vec.expr import VEC2, components_of, constant, scalarize, var, vec2, vec3
+from sdf2vec.expr import constant, var, vec2, vec3
+from sdf2vec.graph import components_of, scalarize
 from sdf2vec.layer import Formula, P, Part
 from sdf2vec.lower.torch import compile_torch
+from sdf2vec.operation import VEC2
 from sdf2vec.paints import BASE, FLAT, PAINTS, linear_paint
 from sdf2vec.render.reference import render
 from sdf2vec.shapes import KINDS

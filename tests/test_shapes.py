@@ -8,10 +8,13 @@ import torch
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from sdf2vec.expr import VEC2, components_of, const, gradient, scalarize, var
+from sdf2vec.expr import const, var
+from sdf2vec.graph import components_of, gradient, scalarize
 from sdf2vec.lower.torch import compile_torch
+from sdf2vec.operation import VEC2
+from sdf2vec.outlines import EllipseOutline, PolygonOutline, RectangleOutline
 from sdf2vec.scene import Shape
-from sdf2vec.shapes import KINDS, EllipseOutline, PolygonOutline, RectangleOutline
+from sdf2vec.shapes import KINDS
 
 P = var("p", VEC2)
 DIAGONAL = math.sqrt(0.5)

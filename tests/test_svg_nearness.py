@@ -25,8 +25,8 @@ from sdf2vec.export.svg.sampling import SampleGrid, covers, distances, extent, g
 from sdf2vec.export.svg.visibility import layers_at
 from sdf2vec.export.svg.writer import Style, written
 from sdf2vec.image import premultiply
+from sdf2vec.outlines import PolygonOutline
 from sdf2vec.render.reference import render
-from sdf2vec.shapes import PolygonOutline
 
 from .scenes import random_shape
 

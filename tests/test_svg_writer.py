@@ -17,7 +17,7 @@ from sdf2vec.export.svg.display import (
     Stop,
 )
 from sdf2vec.export.svg.writer import Style, number, written
-from sdf2vec.shapes import EllipseOutline, PolygonOutline, RectangleOutline
+from sdf2vec.outlines import EllipseOutline, PolygonOutline, RectangleOutline
 
 NAMESPACE = "{http://www.w3.org/2000/svg}"
 RED, BLUE = (1.0, 0.0, 0.0), (0.0, 0.0, 1.0)

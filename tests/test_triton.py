@@ -14,7 +14,8 @@ import torch
 
 from sdf2vec import Layer, Scene, Shape, kernel_cache
 from sdf2vec.blend import COMPOSITING
-from sdf2vec.expr import OPERATIONS, scalarize, var
+from sdf2vec.expr import OPERATIONS, var
+from sdf2vec.graph import scalarize
 from sdf2vec.layer import Part
 from sdf2vec.lower import triton as triton_lowering
 from sdf2vec.lower.block import Block

@@ -6,8 +6,10 @@ import pytest
 import torch
 
 from sdf2vec import units
-from sdf2vec.expr import FLOAT, VECTOR, components_of, const, constant, operation, scalarize, substitute, var
+from sdf2vec.expr import const, constant, operation, var
+from sdf2vec.graph import components_of, scalarize, substitute
 from sdf2vec.layer import JOIN, LOOK
+from sdf2vec.operation import FLOAT, VECTOR
 from sdf2vec.paints import PAINTS
 from sdf2vec.shapes import KINDS
 from sdf2vec.units import Fractions, Parameter, Placed, Room, Unit, grown

@@ -6,10 +6,12 @@ import json
 from collections.abc import Iterable
 
 from ..blend import COMPOSITING, FRAMINGS, JOINS, display, grid_point, union_reach
-from ..expr import VEC2, VEC4, Expr, scalarize, var
+from ..expr import Expr, var
+from ..graph import scalarize
 from ..layer import PIXEL, Formula, P, Part
 from ..lower.javascript import function_text
 from ..lower.shader import GLSL, definition, expression, used_functions
+from ..operation import VEC2, VEC4
 from ..paints import FLAT, PAINTS
 from ..scene import MAX_JOINED, Scene
 from ..scene_file import FORMAT, VERSION

@@ -4,9 +4,10 @@ from __future__ import annotations
 
 from typing import Any
 
-from ..expr import VEC2, Expr, const, var, vec2
+from ..expr import Expr, const, var, vec2
 from ..layer import JOIN, LOOK, STILL, P, shape_at
 from ..lower.shader import Dialect, expression
+from ..operation import VEC2
 from ..paints import PAINTS
 from ..scene import Scene
 from ..shapes import KINDS

@@ -18,10 +18,12 @@ from dataclasses import dataclass, replace
 import numpy as np
 import torch
 
-from ..arrays import Float32Array, IntArray
+from ..arrays import Float32Array, Float64Array, IntArray
 from ..blend import COMPOSITING, MIN_FALLOFF_PIXELS
-from ..expr import VEC2, VECTOR, Expr, components_of, const, constant, operation, scalarize, substitute, var
+from ..expr import Expr, const, constant, operation, var
+from ..graph import components_of, scalarize, substitute
 from ..layer import JOIN, LOOK, slots
+from ..operation import VEC2, VECTOR
 from ..paints import PAINTS
 from ..render import reference
 from ..render.draw import draw, is_large
@@ -477,7 +479,7 @@ def _cell_boxes(scene: Scene, slack: float) -> tuple[Grid, list[tuple[int, int, 
     return grid, [(a, b, c, d) for a, b, c, d in clipped]
 
 
-def _boxes(scene: Scene, slack: float) -> NDArray[np.float64]:
+def _boxes(scene: Scene, slack: float) -> Float64Array:
     """For each layer a box that holds its coverage, and its shapes, also those that only take away; [L, 4]."""
     boxes, firsts = layer_bounds(scene, slack).boxes, first_records(scene.layers)
     alone = (Layer((shape,), layer.falloff) for layer in scene.layers for shape in layer.shapes)

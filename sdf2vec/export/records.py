@@ -14,22 +14,10 @@ import numpy as np
 
 from ..arrays import Float32Array, IntArray
 from ..blend import COMPOSITING, JOINS
-from ..expr import (
-    VEC4,
-    VECTOR,
-    Expr,
-    component,
-    const,
-    constant,
-    hoist,
-    operation,
-    scalarize,
-    select,
-    substitute,
-    var,
-    vec3,
-)
+from ..expr import Expr, component, const, constant, operation, select, var, vec3
+from ..graph import hoist, scalarize, substitute
 from ..layer import PIXEL, STILL, P, cover_of, shape_at
+from ..operation import VEC4, VECTOR
 from ..paints import FLAT, PAINTS
 from ..scene import Layer, Scene, Shape
 from ..shapes import KINDS

@@ -12,9 +12,10 @@ import numpy as np
 from ..arrays import Float32Array, IntArray
 from ..blend import BREATH, COMPOSITING, FRAMINGS, breath, display, grid_point, surface_point
 from ..errors import Sdf2vecError
-from ..expr import VEC2, Expr, const, var, vec2, vec4
+from ..expr import Expr, const, var, vec2, vec4
 from ..layer import STILL, Formula, P, constant_row
 from ..lower.shader import GLSL, WGSL, Dialect, definition, expression, literal, statements, used_functions
+from ..operation import VEC2
 from ..paints import FLAT
 from ..scene import Layer, Scene
 from ..templating import template

@@ -16,7 +16,8 @@ import torch
 
 from ..arrays import BoolArray, Float64Array, IntArray
 from ..blend import COMPOSITING
-from ..expr import components_of, var
+from ..expr import var
+from ..graph import components_of
 from ..layer import Formula, P, Structure
 from ..lower.torch import Tensors, compile_torch
 from ..render.fused import uniform_rows

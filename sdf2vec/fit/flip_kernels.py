@@ -9,7 +9,7 @@ apart.
 import numpy as np
 
 from .. import flip, kernel_cache
-from ..expr import gradient
+from ..graph import gradient
 from ..kernel_cache import inlined, kernel
 from ..lower.numba import PREAMBLE, Block, forward
 from ..lower.numba_math import ZERO, f32

@@ -6,7 +6,8 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from typing import NamedTuple
 
-from ..expr import Expr, adjoints, const, operation, var, walk
+from ..expr import Expr, const, operation, var
+from ..graph import adjoints, walk
 
 
 @dataclass(frozen=True)

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from ..expr import OPERATIONS, Expr, constant, walk
+from ..expr import OPERATIONS, Expr, constant
+from ..graph import walk
 
 
 def function_text(name: str, scalars: Sequence[Expr], inputs: Sequence[Expr]) -> str:

@@ -10,7 +10,8 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 
-from ..expr import OPERATIONS, Expr, constant, walk
+from ..expr import OPERATIONS, Expr, constant
+from ..graph import walk
 from .block import Block, dependent, derivatives, without_divisions
 
 __all__ = ["PREAMBLE", "Block", "backward", "forward", "scalar"]

@@ -12,19 +12,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..expr import (
-    CALL,
-    COMPONENTS,
-    OPERATIONS,
-    PRECEDENCE,
-    Cell,
-    Expr,
-    Function,
-    Operation,
-    Type,
-    constant,
-    walk,
-)
+from ..expr import OPERATIONS, Expr, Function, constant
+from ..graph import walk
+from ..operation import CALL, COMPONENTS, PRECEDENCE, Cell, Operation, Type
 
 
 @dataclass(frozen=True)

@@ -6,7 +6,8 @@ from collections.abc import Callable, Sequence
 
 import torch
 
-from ..expr import OPERATIONS, Expr, constant, scalarize, walk
+from ..expr import OPERATIONS, Expr, constant
+from ..graph import scalarize, walk
 
 Tensors = tuple[torch.Tensor, ...]
 

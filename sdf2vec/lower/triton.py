@@ -8,7 +8,8 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 
-from ..expr import OPERATIONS, Expr, const, constant, walk
+from ..expr import OPERATIONS, Expr, const, constant
+from ..graph import walk
 from .block import Block, derivatives, without_divisions
 
 PREAMBLE = '''\

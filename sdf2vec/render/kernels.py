@@ -11,9 +11,11 @@ from functools import cache
 from types import ModuleType
 
 from .. import kernel_cache
-from ..expr import VEC4, Expr, components_of, const, scalarize, var, walk
+from ..expr import Expr, const, var
+from ..graph import components_of, scalarize, walk
 from ..layer import NEVER, PIXEL, Formula, P, Structure
 from ..lower.numba import PREAMBLE, Block, backward, forward, scalar
+from ..operation import VEC4
 from ..templating import template
 from .tiling import TILE
 

@@ -14,9 +14,11 @@ import torch
 from torch.utils.checkpoint import checkpoint
 
 from ..blend import COMPOSITING, display, pixel_size, scene_point
-from ..expr import VEC2, VEC3, VEC4, components_of, scalarize, var
+from ..expr import var
+from ..graph import components_of, scalarize
 from ..layer import Formula, P, Structure
 from ..lower.torch import Tensors, compile_torch
+from ..operation import VEC2, VEC3, VEC4
 from ..scene import Scene
 from .tensors import Group, SceneTensors, from_scene
 

@@ -9,7 +9,7 @@ from functools import cache
 from types import ModuleType
 
 from .. import kernel_cache
-from ..expr import components_of, scalarize
+from ..graph import components_of, scalarize
 from ..layer import Formula, P, Structure
 from ..lower.block import Block
 from ..lower.triton import PREAMBLE, backward, forward

@@ -17,8 +17,8 @@ import numpy as np
 
 from ...arrays import BoolArray, Float64Array
 from ...deferred import deferred
+from ...outlines import Outline
 from ...scene import Layer
-from ...shapes import Outline
 from .canvas import Canvas
 from .isobands import contours
 from .outlines import Traced, core, distance_to, edge_of, sharpened

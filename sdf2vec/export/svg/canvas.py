@@ -8,8 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from ...arrays import Float64Array
+from ...outlines import Point
 from ...scene import Scene
-from ...shapes import Point
 
 Points = Float64Array  # [N, 2]
 

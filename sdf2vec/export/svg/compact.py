@@ -14,8 +14,8 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from ...deferred import deferred
+from ...outlines import EllipseOutline, Outline, PolygonOutline
 from ...scene import Layer, Scene
-from ...shapes import EllipseOutline, Outline, PolygonOutline
 from .blur import LEAST, Blurred, deviation_of_edge, nearest, trial_of
 from .canvas import Canvas, pairs
 from .display import Figure, Geometry, moved

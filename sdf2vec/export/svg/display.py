@@ -10,8 +10,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import NamedTuple
 
+from ...outlines import Outline, Point
 from ...scene import Color
-from ...shapes import Outline, Point
 
 Segment = tuple[Point, ...]  # a Bézier curve without its start: one point is a line, three are a cubic
 

@@ -14,8 +14,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ...outlines import EllipseOutline, PolygonOutline
 from ...scene import Color, Layer
-from ...shapes import EllipseOutline, PolygonOutline
 from .canvas import Canvas, Points, pairs
 from .display import Figure, Fill, Group, LinearGradient, RadialGradient, Stop, moved
 from .gradient_stops import edge_stops

@@ -7,8 +7,9 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from ...outlines import EllipseOutline
 from ...scene import Color, Layer, Scene
-from ...shapes import KINDS, EllipseOutline
+from ...shapes import KINDS
 from .bezier_fit import smooth_path, straight_path
 from .blur import Blurred
 from .canvas import Canvas

@@ -9,8 +9,9 @@ from functools import singledispatch
 import numpy as np
 
 from ...arrays import Float64Array
+from ...outlines import EllipseOutline, Outline, PolygonOutline, RectangleOutline
 from ...scene import Layer
-from ...shapes import KINDS, EllipseOutline, Outline, PolygonOutline, RectangleOutline
+from ...shapes import KINDS
 from .bezier_fit import smooth_path
 from .canvas import Canvas, Points, pairs
 from .display import Geometry

@@ -12,7 +12,8 @@ import torch
 
 from ...arrays import Float64Array
 from ...blend import OVER, coverage, reach, saturation
-from ...expr import components_of, const, constant, scalarize, substitute, var
+from ...expr import const, constant, var
+from ...graph import components_of, scalarize, substitute
 from ...layer import PIXEL, Formula, P, Structure, constant_row
 from ...lower.torch import compile_torch
 from ...scene import Layer, Shape

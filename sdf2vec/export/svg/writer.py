@@ -16,8 +16,8 @@ from xml.sax.saxutils import escape
 import numpy as np
 import svgwrite
 
+from ...outlines import EllipseOutline, Point, PolygonOutline, RectangleOutline
 from ...scene import Color
-from ...shapes import EllipseOutline, Point, PolygonOutline, RectangleOutline
 from .canvas import Points, pairs
 from .display import (
     Contour,
