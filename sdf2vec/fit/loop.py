@@ -19,8 +19,8 @@ from ..render import fused
 from ..render.tensors import Group, SceneTensors, from_scene, on_device, to_scene
 from ..scene import Scene
 from ..threads import threads_of_its_own
-from ..units import BACKGROUND, OPACITY, Unit
-from .adam import Adam
+from ..units import BACKGROUND, OPACITY
+from .adam import Adam, rate_of
 from .backends import Backend, choose
 from .constraints import enforce_min_thickness, project, too_small
 from .growth import densify, exchange, importance, prune, relocate
@@ -318,11 +318,6 @@ def adam(tensors: SceneTensors, crowding: float = CROWDING, frozen: tuple[str, .
     crowd = few ** (crowding if few < 1 else CROWDING)
     canvas = math.sqrt(tensors.size[0] * tensors.size[1])
     return Adam((tensor, rate_of(unit, canvas, crowd)) for unit, tensor in free if unit.name not in frozen)
-
-
-def rate_of(unit: Unit, canvas: float, crowd: float) -> float:
-    """Adam's rate for a canvas of this size, the square root of its area; `crowd` is the factor for many layers."""
-    return unit.rate * (crowd if unit.crowded else 1.0) * canvas**unit.scaling
 
 
 def _rates(phase: Phase) -> Iterator[float]:
