@@ -8,7 +8,7 @@ structure at a time in one tensor: kernels would have to be compiled for every s
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, replace
 from functools import partial
 from typing import NamedTuple
@@ -16,24 +16,27 @@ from typing import NamedTuple
 import torch
 
 from ..blend import JOINS, UNION
-from ..layer import Part, Slot
+from ..layer import Part, Slot, row_width
 from ..paints import BASE, FLAT
 from ..render.reference import canvas, composite_points, group_coverage, lay
 from ..render.tensors import Group, SceneTensors
 from ..shapes import KINDS
 from ..units import COLOR, SMOOTHNESS, Placed
-from .adam import Adam, rate_of
-from .constraints import enforce_min_thickness, project
+from .adam import rate_of
+from .constraints import project
 from .initialization import Layers, Places, groups_at, start_of, straight
 from .matching_pursuit import find_discs
 
-RESOLUTION = 64  # pixels squared at which candidates are tried
+RESOLUTION = 48  # pixels squared at which candidates are tried
 STARTS = 3  # of each kind and join
-SCREENED, TRAINED = 15, 60  # steps of every candidate; of the best few after that
+SCREENING, TRAINING = 8, 12  # steps of every candidate; of the best few after that
 FINALISTS = 3
-RATE, END_RATE = 3.0, 0.1
+FIRST_DAMPING, LESS, MORE = 0.1, 0.3, 5.0  # of a step; after one that helps, after one that does not
+LONGEST_STEP = 20.0  # rates
+TINY = 1e-9
+SMALL = 2e-4  # change of a number that its derivative is taken from
 LEAST_GAIN = 0.03  # of a layer's share of the error: what a join must take away to be kept
-LEAST_ERROR = 2e-5  # mean square: below it nothing is missing
+LEAST_ERROR = 5e-5  # mean square: below it nothing is missing
 START_SMOOTHNESS = 0.01  # scene units
 START_FALLOFF = 0.05
 MISSING = 0.1  # share of all that is missing from a layer from which on it is worth adding; so with too much
@@ -122,6 +125,11 @@ class Tried(NamedTuple):
     error: float
 
 
+def _rank(tried: Tried) -> tuple[float, int]:
+    """The less wrong the better; of those where nothing is missing, that of fewer numbers."""
+    return max(tried.error, LEAST_ERROR), row_width(tried.layer.structure)
+
+
 @dataclass(frozen=True)
 class Search:
     """What is tried and how: what new shapes are, the range of falloffs, where randomness comes from."""
@@ -131,6 +139,7 @@ class Search:
     generator: torch.Generator
     tick: Tick
     size: tuple[float, float]
+    pixel: float
 
     def joined(self, layer: Group, around: Surroundings, most: int) -> Tried:
         """A layer, begun anew where that is better, with up to `most` shapes joined to it, while that helps."""
@@ -145,34 +154,48 @@ class Search:
             best = tried
         return best
 
-    def best(self, groups: Sequence[Group], around: Surroundings) -> Tried:
-        """The best of some layers after training: all a little, then the best few."""
-        rows = [row for group in groups for row in self._trained(group, around, SCREENED, END_RATE * 4)]
+    def best(self, groups: Iterable[Group], around: Surroundings) -> Tried:
+        """The best of some layers after training: of all, the last shape alone; then the best few, as a whole."""
+        rows = [row for group in groups for row in self._trained(group, around, SCREENING, last=True)]
         finalists = sorted(rows, key=lambda row: row.error)[:FINALISTS]
-        trained = [row for tried in finalists for row in self._trained(tried.layer, around, TRAINED)]
-        return min(trained, key=lambda row: row.error)
+        trained = [row for tried in finalists for row in self._trained(tried.layer, around, TRAINING)]
+        return min(trained, key=_rank)
 
-    def _trained(
-        self, group: Group, around: Surroundings, steps: int, end_rate: float = END_RATE
-    ) -> Iterator[Tried]:
-        """Each layer of a group after so many steps."""
-        scene = replace(around.scene, groups=[group.each(lambda tensor: tensor.detach().clone())])
-        moving = scene.groups[0]
-        canvas_side = math.sqrt(scene.size[0] * scene.size[1])
-        optimizer = Adam((v, rate_of(slot.parameter.unit, canvas_side, 1.0)) for slot, v in moving.values.items())
-        pixel = float(around.points[2])
-        for step in range(steps):
-            optimizer.zero_grad()
-            errors = around.errors(around.images(moving))
-            errors.sum().backward()
-            optimizer.step(RATE * (end_rate / RATE) ** (step / steps))
-            project(scene, pixel, self.falloff)
-            self.tick(float(errors.detach().min()))
-        enforce_min_thickness(scene, pixel)
-        with torch.no_grad():
-            errors = around.errors(around.images(moving))
-        for row, error in enumerate(errors.tolist()):
-            yield Tried(moving.each(lambda tensor, row=row: tensor.detach()[row : row + 1]), error)
+    def _trained(self, group: Group, around: Surroundings, steps: int, last: bool = False) -> Iterator[Tried]:
+        """Each layer of a group after so many steps down the squared error; `last`: only of its last shape and its look.
+
+        Levenberg's and Marquardt's steps, each number's no longer than `LONGEST_STEP` of its rate.
+        """
+        free, limits = self._free(group, last)
+        damping = torch.full((len(group),), FIRST_DAMPING)
+        errors = around.errors(around.images(group))
+        for _ in range(steps):
+            step = _descent(group, around, free, damping).clamp(-limits, limits)
+            rows = group.rows()
+            rows[:, free] -= step
+            moved = _of_rows(group, rows)
+            self._project(moved, around)
+            found = around.errors(around.images(moved))
+            better = found < errors
+            group = _of_rows(group, torch.where(better[:, None], moved.rows(), group.rows()))
+            errors = torch.where(better, found, errors)
+            damping = (damping * torch.where(better, LESS, MORE)).clamp(1e-7, 1e4)
+            self.tick(float(errors.min()))
+        for index, error in enumerate(errors.tolist()):
+            yield Tried(group.each(partial(_row, index)), error)
+
+    def _free(self, group: Group, last: bool) -> tuple[torch.Tensor, torch.Tensor]:
+        """Which numbers of a row move, and how far in one step."""
+        side = math.sqrt(self.size[0] * self.size[1])
+        moves, limits = [], []
+        for slot in group.values:
+            free = not last or slot.part in (None, len(group.structure) - 1) or slot.parameter.unit is COLOR
+            moves += [free] * slot.parameter.width
+            limits += [rate_of(slot.parameter.unit, side, LONGEST_STEP)] * slot.parameter.width if free else []
+        return torch.tensor(moves).nonzero()[:, 0], torch.tensor(limits)
+
+    def _project(self, group: Group, around: Surroundings) -> None:
+        project(replace(around.scene, groups=[group]), self.pixel, self.falloff)
 
     def _alone(self, around: Surroundings) -> list[Group]:
         """Layers of one shape of each kind, where the picture differs most from what is there without the layer."""
@@ -239,3 +262,32 @@ def _extended(layer: Group, part: Part, placed: Placed) -> Group:
     index = len(layer.structure)
     fresh = {Slot(index, parameter): start_of(parameter, placed, looks) for parameter in part.parameters}
     return Group((*layer.structure, part), row.order, row.values | fresh)
+
+
+def _descent(
+    layers: Group, around: Surroundings, free: torch.Tensor, damping: torch.Tensor
+) -> torch.Tensor:
+    """The damped Gauss-Newton steps [G, F] of the free numbers of some layers; derivatives are differences."""
+    rows, count = layers.rows(), len(free)
+    moved = rows[:, None].repeat(1, count + 1, 1)
+    moved[:, torch.arange(count), free] += SMALL
+    images = around.images(_of_rows(layers, moved.flatten(0, 1))).unflatten(0, (-1, count + 1))
+    images = (images - around.target.flatten(1)) * around.weights
+    images = images.flatten(2)  # [G, F + 1, C · P]
+    wrong = images[:, -1:]
+    slopes = (images[:, :-1] - wrong) / SMALL
+    normal = slopes @ slopes.mT
+    scale = normal.diagonal(dim1=1, dim2=2)
+    normal = normal + torch.diag_embed(scale * damping[:, None] + TINY)
+    return torch.linalg.solve(normal, slopes @ wrong.mT)[..., 0]
+
+
+def _of_rows(like: Group, rows: torch.Tensor) -> Group:
+    """Layers of a structure from their rows [G, U]."""
+    parts = rows.split([slot.parameter.width for slot in like.values], dim=1)
+    order = like.order[:1].expand(len(rows))
+    return Group(like.structure, order, dict(zip(like.values, parts, strict=True)))
+
+
+def _row(index: int, tensor: torch.Tensor) -> torch.Tensor:
+    return tensor[index : index + 1]
