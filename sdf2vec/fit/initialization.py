@@ -187,9 +187,7 @@ def _group(
         SMOOTHNESS.name: places.sizes[:, None] * START_SMOOTHNESS,
         COLOR.name: places.colors[:, :3],
     }
-    values = {
-        slot: start_of(slot.parameter, placed[slot.part or 0], looks) for slot in slots(structure)
-    }
+    values = {slot: start_of(slot.parameter, placed[slot.part or 0], looks) for slot in slots(structure)}
     return Group(structure, order, values)
 
 

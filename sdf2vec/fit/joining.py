@@ -15,10 +15,10 @@ from typing import NamedTuple
 
 import torch
 
-from ..blend import JOINS, UNION
+from ..blend import JOINS
 from ..layer import Part, Slot, row_width
 from ..paints import BASE, FLAT
-from ..render.reference import canvas, composite_points, group_coverage, lay
+from ..render.reference import canvas, composite_points, group_coverage, lay, layers_at
 from ..render.tensors import Group, SceneTensors
 from ..shapes import KINDS
 from ..units import COLOR, SMOOTHNESS, Placed
@@ -27,10 +27,12 @@ from .constraints import project
 from .initialization import Layers, Places, groups_at, start_of, straight
 from .matching_pursuit import find_discs
 
-RESOLUTION = 48  # pixels squared at which candidates are tried
+RESOLUTION = 40  # pixels squared at which candidates are tried
 STARTS = 3  # of each kind and join
-SCREENING, TRAINING = 8, 12  # steps of every candidate; of the best few after that
+SCREENING, TRAINING = 6, 12  # steps of every candidate; of the best few after that
 FINALISTS = 3
+REFINING = 8  # steps at the end
+MOST_JOINED = 24  # shapes in one layer
 FIRST_DAMPING, LESS, MORE = 0.1, 0.3, 5.0  # of a step; after one that helps, after one that does not
 LONGEST_STEP = 20.0  # rates
 TINY = 1e-9
@@ -38,10 +40,55 @@ SMALL = 2e-4  # change of a number that its derivative is taken from
 LEAST_GAIN = 0.03  # of a layer's share of the error: what a join must take away to be kept
 LEAST_ERROR = 5e-5  # mean square: below it nothing is missing
 START_SMOOTHNESS = 0.01  # scene units
-START_FALLOFF = 0.05
+SURPLUS = 0.25  # how much an error matters, at first, where nothing is wanted
 MISSING = 0.1  # share of all that is missing from a layer from which on it is worth adding; so with too much
 
 Tick = Callable[[float], None]  # told of the error after every step; raises to stop
+
+
+class View(NamedTuple):
+    """A picture at some size: premultiplied [C, H, W], and how much an error matters there [H, W], or None."""
+
+    target: torch.Tensor
+    weights: torch.Tensor | None
+
+
+@torch.no_grad()
+def join(scene: SceneTensors, coarse: View, fine: View, search: Search, most: int) -> Iterator[SceneTensors]:
+    """The scene after each of its layers has had shapes joined to it, the worst first; tried `most` times in all.
+
+    Tried at the resolution of one picture, refined at that of the other.
+    """
+    left = list(range(scene.layer_count))
+    while left and most > 0:
+        order = max(left, key=_faults(scene, coarse).__getitem__)
+        left.remove(order)
+        (layer,) = _some(scene, partial(torch.Tensor.__eq__, order)).groups
+        found, tries = search.joined(layer, Surroundings.of(scene, order, *coarse), most)
+        if found.layer is not layer:
+            scene = _replaced(scene, search.refined(found.layer, Surroundings.of(scene, order, *fine)))
+        most -= tries
+        yield scene
+
+
+def _faults(scene: SceneTensors, view: View) -> list[float]:
+    """For each layer in draw order, how wrong the picture is where it covers."""
+    points = canvas(scene, view.target.shape[2], view.target.shape[1])
+    wrong = composite_points(scene, *points)[: len(view.target)] - view.target.flatten(1)
+    weighted = wrong if view.weights is None else wrong * view.weights.flatten()
+    covers, _ = layers_at(scene, *points)
+    faults: list[float] = (covers @ weighted.square().sum(0)).tolist()
+    return faults
+
+
+def _replaced(scene: SceneTensors, layer: Group) -> SceneTensors:
+    """The scene with another layer in the place of that with the same draw order."""
+    groups = list(_some(scene, lambda place: place != layer.order).groups)
+    for index, group in enumerate(groups):
+        if group.structure == layer.structure:
+            groups[index] = group.joined(layer)
+            return replace(scene, groups=groups)
+    return replace(scene, groups=[*groups, layer])
 
 
 @dataclass(frozen=True)
@@ -64,12 +111,14 @@ class Surroundings:
         cls, scene: SceneTensors, order: int, target: torch.Tensor, weights: torch.Tensor | None
     ) -> Surroundings:
         """Those of the layer at this place in the draw order."""
-        points = canvas(scene, target.shape[2], target.shape[1])
+        x, y, pixel = points = canvas(scene, target.shape[2], target.shape[1])
         below = _some(scene, lambda place: place < order)
         above = _some(scene, lambda place: place > order)
-        ends = [composite_points(replace(above, background=torch.full((4,), end)), *points) for end in (0.0, 1.0)]
+        dark, light = (
+            composite_points(replace(above, background=torch.full((4,), end)), *points) for end in (0.0, 1.0)
+        )
         own = torch.ones_like(points[0]) if weights is None else weights.flatten()
-        return cls(points, target, own, composite_points(below, *points), *ends, scene)
+        return cls((x, y, pixel), target, own, composite_points(below, *points), dark, light, scene)
 
     def images(self, group: Group) -> torch.Tensor:
         """The scene with each of some layers alone in the place of this one, [G, C, P]."""
@@ -79,6 +128,16 @@ class Surroundings:
     def _seen(self, laid: torch.Tensor) -> torch.Tensor:
         return (self.dark + (self.light - self.dark) * laid)[..., : len(self.target), :]
 
+    def eager(self) -> Surroundings:
+        """Such that it matters less where a layer is and should not be: what is too much can be cut out."""
+        amount = self.residual.square().sum(0).sqrt().flatten()
+        share = SURPLUS + (1.0 - SURPLUS) * amount / amount.max().clamp_min(1e-6)
+        return replace(self, weights=self.weights * share)
+
+    def measured(self, layer: Group) -> Tried:
+        """A layer and its error."""
+        return Tried(layer, float(self.errors(self.images(layer))))
+
     def errors(self, images: torch.Tensor) -> torch.Tensor:
         """Weighted mean squared errors [G]."""
         missing = (images - self.target.flatten(1)) * self.weights
@@ -87,8 +146,7 @@ class Surroundings:
     @property
     def residual(self) -> torch.Tensor:
         """What is missing without the layer, [C, H, W]."""
-        with torch.no_grad():
-            bare = self._seen(self.below)
+        bare = self._seen(self.below)
         return ((self.target.flatten(1) - bare) * self.weights).reshape(self.target.shape)
 
     def cover(self, layer: Group) -> torch.Tensor:
@@ -101,7 +159,9 @@ class Surroundings:
         compositing = self.scene.compositing
         cover, color = group_coverage(layer, compositing, *self.points)
         bare, full = (
-            self._seen(lay(compositing, self.below, color, layer.opacity[:, 0], torch.full_like(cover, end)))[0]
+            self._seen(lay(compositing, self.below, color, layer.opacity[:, 0], torch.full_like(cover, end)))[
+                0
+            ]
             for end in (0.0, 1.0)
         )
         change = (full - bare) * self.weights
@@ -113,9 +173,13 @@ class Surroundings:
 
 def _some(scene: SceneTensors, which: Callable[[torch.Tensor], torch.Tensor]) -> SceneTensors:
     """The layers at some places of the draw order."""
-    picked = [(group, which(group.order)) for group in scene.groups]
-    groups = [group.each(lambda tensor, rows=rows: tensor[rows]) for group, rows in picked if rows.any()]
+    picked = [(group, which(group.order).nonzero()[:, 0]) for group in scene.groups]
+    groups = [group.each(partial(_take, rows)) for group, rows in picked if len(rows)]
     return replace(scene, groups=groups)
+
+
+def _take(rows: torch.Tensor, tensor: torch.Tensor) -> torch.Tensor:
+    return tensor[rows]
 
 
 class Tried(NamedTuple):
@@ -138,21 +202,38 @@ class Search:
     falloff: tuple[float, float]
     generator: torch.Generator
     tick: Tick
-    size: tuple[float, float]
-    pixel: float
+    pixel: float  # scene units: the least length
 
-    def joined(self, layer: Group, around: Surroundings, most: int) -> Tried:
-        """A layer, begun anew where that is better, with up to `most` shapes joined to it, while that helps."""
-        best = self.best([layer, *self._alone(around)], around)
-        for _ in range(most):
-            if best.error < LEAST_ERROR:
-                break
-            tried = self.best(self._candidates(best.layer, around), around)
-            share = 1.0 - LEAST_GAIN / around.scene.layer_count
-            if tried.error > best.error * share:
+    def joined(self, layer: Group, around: Surroundings, most: int) -> tuple[Tried, int]:
+        """A layer, begun anew where that is better, with shapes joined to it while that helps; and how often it was tried.
+
+        Tried at most so often. What comes back is never worse than the layer.
+        """
+        before = around.measured(layer)
+        is_patch = KINDS[layer.structure[0].kind].patch is not None
+        first = self.best([*([] if is_patch else [layer]), *self._alone(around)], around)
+        if first.error < LEAST_ERROR:
+            return min(before, first, key=_rank), 1
+        wide = around.measured(self.best(self._alone(around), around.eager()).layer)
+        best, tries = min((self._grown(start, around) for start in (first, wide)), key=_rank), 1
+        while tries < most and best.error > LEAST_ERROR and len(best.layer.structure) <= MOST_JOINED:
+            tries += 1
+            tried = self._grown(best, around)
+            if tried is best:
                 break
             best = tried
-        return best
+        return min(before, best, key=_rank), tries
+
+    def _grown(self, layer: Tried, around: Surroundings) -> Tried:
+        """The layer with one more shape if that takes enough away from the error, or the layer."""
+        tried = self.best([layer.layer, *self._candidates(layer.layer, around)], around)
+        share = LEAST_GAIN / around.scene.layer_count
+        return tried if tried.error < layer.error * (1.0 - share) else layer
+
+    def refined(self, layer: Group, around: Surroundings) -> Group:
+        """A layer after some more steps."""
+        (tried,) = self._trained(layer, around, REFINING)
+        return tried.layer
 
     def best(self, groups: Iterable[Group], around: Surroundings) -> Tried:
         """The best of some layers after training: of all, the last shape alone; then the best few, as a whole."""
@@ -166,7 +247,7 @@ class Search:
 
         Levenberg's and Marquardt's steps, each number's no longer than `LONGEST_STEP` of its rate.
         """
-        free, limits = self._free(group, last)
+        free, limits = _free(group, around, last)
         damping = torch.full((len(group),), FIRST_DAMPING)
         errors = around.errors(around.images(group))
         for _ in range(steps):
@@ -182,17 +263,7 @@ class Search:
             damping = (damping * torch.where(better, LESS, MORE)).clamp(1e-7, 1e4)
             self.tick(float(errors.min()))
         for index, error in enumerate(errors.tolist()):
-            yield Tried(group.each(partial(_row, index)), error)
-
-    def _free(self, group: Group, last: bool) -> tuple[torch.Tensor, torch.Tensor]:
-        """Which numbers of a row move, and how far in one step."""
-        side = math.sqrt(self.size[0] * self.size[1])
-        moves, limits = [], []
-        for slot in group.values:
-            free = not last or slot.part in (None, len(group.structure) - 1) or slot.parameter.unit is COLOR
-            moves += [free] * slot.parameter.width
-            limits += [rate_of(slot.parameter.unit, side, LONGEST_STEP)] * slot.parameter.width if free else []
-        return torch.tensor(moves).nonzero()[:, 0], torch.tensor(limits)
+            yield Tried(group.each(partial(_take, torch.tensor([index]))), error)
 
     def _project(self, group: Group, around: Surroundings) -> None:
         project(replace(around.scene, groups=[group]), self.pixel, self.falloff)
@@ -201,7 +272,7 @@ class Search:
         """Layers of one shape of each kind, where the picture differs most from what is there without the layer."""
         residual = around.residual
         amount = residual.square().sum(0).sqrt()
-        placed = self._placed(amount)
+        placed = self._placed(amount, around.scene.size)
         wanted = residual if self.layers.signed else around.target
         color = straight((wanted * amount).sum(dim=(1, 2))[None] / amount.sum().clamp_min(1e-6))
         places = Places(placed.centers, placed.sizes, color.expand(STARTS, 4))
@@ -212,15 +283,13 @@ class Search:
 
     def _candidates(self, layer: Group, around: Surroundings) -> Iterator[Group]:
         """The layer with one more shape, of each kind, joined in each way where something is wrong."""
-        with torch.no_grad():
-            missing = around.missing(layer)
-            cover = around.cover(layer)
+        missing, cover = around.missing(layer), around.cover(layer)
         less, more = (-missing).clamp(min=0.0), missing.clamp(min=0.0)
         rest = float(missing.abs().sum()) * MISSING
         places = {"union": more, "subtraction": less, "intersection": (cover - less).clamp(min=0.0)}
         for join, amount in places.items():
             if (more if JOINS[join].adds else less).sum() > rest:
-                placed = self._placed(amount)
+                placed = self._placed(amount, around.scene.size)
                 for kind in self._kinds:
                     yield _extended(layer, self._part(kind, join), placed)
 
@@ -232,15 +301,17 @@ class Search:
         """Those that can be joined."""
         return [kind for kind in self.layers.kinds if KINDS[kind].patch is None]
 
-    def _placed(self, amount: torch.Tensor) -> Placed:
+    def _placed(self, amount: torch.Tensor, canvas_size: tuple[float, float]) -> Placed:
         """Where most of an amount [H, W] is: all of it first, then the best discs; turned at random."""
         height, width = amount.shape
         found = find_discs(amount[None], STARTS - 1)
         center, radius = _moments(amount)
         centers, radii = torch.cat([center[None], found.centers]), torch.cat([radius[None], found.radii])
-        size = torch.tensor(self.size)
+        size = torch.tensor(canvas_size)
         turns = torch.rand(STARTS, generator=self.generator) * 2 * math.pi
-        return Placed((centers / torch.tensor([width, height]) - 0.5) * size, radii * float(size[0]) / width, turns)
+        return Placed(
+            (centers / torch.tensor([width, height]) - 0.5) * size, radii * float(size[0]) / width, turns
+        )
 
 
 def _moments(amount: torch.Tensor) -> tuple[torch.Tensor, torch.Tensor]:
@@ -264,9 +335,19 @@ def _extended(layer: Group, part: Part, placed: Placed) -> Group:
     return Group((*layer.structure, part), row.order, row.values | fresh)
 
 
-def _descent(
-    layers: Group, around: Surroundings, free: torch.Tensor, damping: torch.Tensor
-) -> torch.Tensor:
+def _free(group: Group, around: Surroundings, last: bool) -> tuple[torch.Tensor, torch.Tensor]:
+    """Which numbers of a row move, and how far in one step."""
+    size = around.scene.size
+    side = math.sqrt(size[0] * size[1])
+    moves, limits = [], []
+    for slot in group.values:
+        free = not last or slot.part in (None, len(group.structure) - 1) or slot.parameter.unit is COLOR
+        moves += [free] * slot.parameter.width
+        limits += [rate_of(slot.parameter.unit, side, LONGEST_STEP)] * slot.parameter.width if free else []
+    return torch.tensor(moves).nonzero()[:, 0], torch.tensor(limits)
+
+
+def _descent(layers: Group, around: Surroundings, free: torch.Tensor, damping: torch.Tensor) -> torch.Tensor:
     """The damped Gauss-Newton steps [G, F] of the free numbers of some layers; derivatives are differences."""
     rows, count = layers.rows(), len(free)
     moved = rows[:, None].repeat(1, count + 1, 1)
@@ -279,7 +360,8 @@ def _descent(
     normal = slopes @ slopes.mT
     scale = normal.diagonal(dim1=1, dim2=2)
     normal = normal + torch.diag_embed(scale * damping[:, None] + TINY)
-    return torch.linalg.solve(normal, slopes @ wrong.mT)[..., 0]
+    steps: torch.Tensor = torch.linalg.solve(normal, slopes @ wrong.mT)[..., 0]
+    return steps
 
 
 def _of_rows(like: Group, rows: torch.Tensor) -> Group:
@@ -287,7 +369,3 @@ def _of_rows(like: Group, rows: torch.Tensor) -> Group:
     parts = rows.split([slot.parameter.width for slot in like.values], dim=1)
     order = like.order[:1].expand(len(rows))
     return Group(like.structure, order, dict(zip(like.values, parts, strict=True)))
-
-
-def _row(index: int, tensor: torch.Tensor) -> torch.Tensor:
-    return tensor[index : index + 1]

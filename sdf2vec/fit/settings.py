@@ -39,7 +39,7 @@ class Settings:
     scene units, 0 for sharp edges only, None leaves it to the preset; `start`: a scene to go on from, at any size;
     `trials`: how often a few layers are tried elsewhere at the end; `palette`: the only colours there may be; `colors`:
     how many there may be where no palette is given, 0 for any; `weights`: how much an error matters, 0..1, [H, W];
-    `device`: auto, cpu, cuda or mps.
+    `device`: auto, cpu, cuda or mps; `cuts`: how often it is tried to join a shape to a layer at the end.
     """
 
     shapes: int = 256
@@ -58,6 +58,7 @@ class Settings:
     colors: int = 0
     weights: NDArray[np.float32] | None = field(default=None, compare=False)
     paint: str = FLAT
+    cuts: int = 0
 
 
 def preset_of(settings: Settings) -> Preset:
@@ -92,6 +93,7 @@ def settings_of(
     palette: str | Sequence[Color | str] | None = None,
     colors: int | None = None,
     weights: Any = None,
+    cuts: int = 0,
 ) -> Settings:
     """The settings of a fit in the words of the user (see `api.fit`). Raises Sdf2vecError for the first bad one."""
     kinds = kinds_of(kind)
@@ -100,6 +102,11 @@ def settings_of(
     _check_whole("seed", seed, 0, 2**63 - 1)
     _check_whole("number of shapes joined (union)", union, 1, MAX_JOINED)
     _check_whole("number of trials", trials, 0, 10_000)
+    _check_whole("number of cuts", cuts, 0, 10_000)
+    if cuts and all(KINDS[name].patch is not None for name in kinds):
+        raise Sdf2vecError(
+            f"cuts need a kind of shape that can be joined with others, got {', '.join(kinds)}"
+        )
     scene = _scene_of(start)
     shapes = _count_of(shapes, scene)
     if shapes % union:
@@ -119,6 +126,7 @@ def settings_of(
         int(trials),
         *_colors(palette, colors),
         weights_of(weights),
+        cuts=int(cuts),
     )
     preset_of(settings)
     if settings.compositing != "over" and (settings.palette or settings.colors):
