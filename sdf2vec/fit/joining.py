@@ -30,8 +30,8 @@ from .matching_pursuit import find_discs
 RESOLUTION = 40  # pixels squared at which candidates are tried
 STARTS = 3  # of each kind and join
 SCREENING, TRAINING = 6, 12  # steps of every candidate; of the best few after that
-FINALISTS = 3
-REFINING = 8  # steps at the end
+FINALISTS, BEAM = 4, 2  # structures that are trained on; that go on to have more joined
+REFINING = 20  # steps at the end
 MOST_JOINED = 24  # shapes in one layer
 FIRST_DAMPING, LESS, MORE = 0.1, 0.3, 5.0  # of a step; after one that helps, after one that does not
 LONGEST_STEP = 20.0  # rates
@@ -211,36 +211,35 @@ class Search:
         """
         before = around.measured(layer)
         is_patch = KINDS[layer.structure[0].kind].patch is not None
-        first = self.best([*([] if is_patch else [layer]), *self._alone(around)], around)
-        if first.error < LEAST_ERROR:
-            return min(before, first, key=_rank), 1
-        wide = around.measured(self.best(self._alone(around), around.eager()).layer)
-        best, tries = min((self._grown(start, around) for start in (first, wide)), key=_rank), 1
-        while tries < most and best.error > LEAST_ERROR and len(best.layer.structure) <= MOST_JOINED:
+        beam = self.best([*([] if is_patch else [layer]), *self._alone(around)], around)[:BEAM]
+        if beam[0].error > LEAST_ERROR:
+            beam += [
+                around.measured(wide.layer) for wide in self.best(self._alone(around), around.eager())[:1]
+            ]
+        least, tries = 1.0 - LEAST_GAIN / around.scene.layer_count, 0
+        while tries < most and beam[0].error > LEAST_ERROR and len(beam[0].layer.structure) <= MOST_JOINED:
             tries += 1
-            tried = self._grown(best, around)
-            if tried is best:
+            grown = self.best((g for start in beam for g in self._candidates(start.layer, around)), around)
+            if not grown or grown[0].error > beam[0].error * least:
                 break
-            best = tried
-        return min(before, best, key=_rank), tries
-
-    def _grown(self, layer: Tried, around: Surroundings) -> Tried:
-        """The layer with one more shape if that takes enough away from the error, or the layer."""
-        tried = self.best([layer.layer, *self._candidates(layer.layer, around)], around)
-        share = LEAST_GAIN / around.scene.layer_count
-        return tried if tried.error < layer.error * (1.0 - share) else layer
+            beam = grown[:BEAM]
+        return min(before, beam[0], key=_rank), max(tries, 1)
 
     def refined(self, layer: Group, around: Surroundings) -> Group:
         """A layer after some more steps."""
         (tried,) = self._trained(layer, around, REFINING)
         return tried.layer
 
-    def best(self, groups: Iterable[Group], around: Surroundings) -> Tried:
-        """The best of some layers after training: of all, the last shape alone; then the best few, as a whole."""
+    def best(self, groups: Iterable[Group], around: Surroundings) -> list[Tried]:
+        """Some layers after training, the best first: of all, the last shape alone; then the best of a few structures."""
         rows = [row for group in groups for row in self._trained(group, around, SCREENING, last=True)]
-        finalists = sorted(rows, key=lambda row: row.error)[:FINALISTS]
-        trained = [row for tried in finalists for row in self._trained(tried.layer, around, TRAINING)]
-        return min(trained, key=_rank)
+        rows.sort(key=lambda row: row.error, reverse=True)
+        finalists = list({row.layer.structure: row for row in rows}.values())
+        finalists.sort(key=lambda row: row.error)
+        trained = [
+            row for tried in finalists[:FINALISTS] for row in self._trained(tried.layer, around, TRAINING)
+        ]
+        return sorted(trained, key=_rank)
 
     def _trained(self, group: Group, around: Surroundings, steps: int, last: bool = False) -> Iterator[Tried]:
         """Each layer of a group after so many steps down the squared error; `last`: only of its last shape and its look.
