@@ -205,9 +205,9 @@ class Search:
     pixel: float  # scene units: the least length
 
     def joined(self, layer: Group, around: Surroundings, most: int) -> tuple[Tried, int]:
-        """A layer, begun anew where that is better, with shapes joined to it while that helps; and how often it was tried.
+        """A layer, begun anew where that is better, with shapes joined to it while that helps.
 
-        Tried at most so often. What comes back is never worse than the layer.
+        Tried `most` times; also how often it was tried. What comes back is never worse than the layer.
         """
         before = around.measured(layer)
         is_patch = KINDS[layer.structure[0].kind].patch is not None
@@ -231,7 +231,7 @@ class Search:
         return tried.layer
 
     def best(self, groups: Iterable[Group], around: Surroundings) -> list[Tried]:
-        """Some layers after training, the best first: of all, the last shape alone; then the best of a few structures."""
+        """Some layers after training, the best first: of all the last shape alone, then the best few structures."""
         rows = [row for group in groups for row in self._trained(group, around, SCREENING, last=True)]
         rows.sort(key=lambda row: row.error, reverse=True)
         finalists = list({row.layer.structure: row for row in rows}.values())
@@ -242,7 +242,7 @@ class Search:
         return sorted(trained, key=_rank)
 
     def _trained(self, group: Group, around: Surroundings, steps: int, last: bool = False) -> Iterator[Tried]:
-        """Each layer of a group after so many steps down the squared error; `last`: only of its last shape and its look.
+        """Each layer of a group after so many steps down the squared error, or the last shape and the look only.
 
         Levenberg's and Marquardt's steps, each number's no longer than `LONGEST_STEP` of its rate.
         """
