@@ -9,7 +9,7 @@ import torch
 import sdf2vec
 from sdf2vec.fit import joining
 from sdf2vec.fit.initialization import Layers
-from sdf2vec.fit.loop import fit_picture
+from sdf2vec.fit.loop import fit_picture, scaled
 from sdf2vec.fit.settings import Settings, settings_of
 from sdf2vec.image import Picture
 from sdf2vec.metrics import psnr
@@ -49,7 +49,7 @@ def started(kind="circle"):
 def joined(pixels, kinds, scene=None, seed=0, most=3):
     """What joining makes of a scene, as a scene again, and how near that is."""
     target = torch.from_numpy(np.ascontiguousarray(pixels.transpose(2, 0, 1)))
-    coarse = torch.nn.functional.avg_pool2d(target[None], 3)[0]
+    coarse = scaled(pixels, joining.RESOLUTION)
     search = joining.Search(
         Layers(kinds, "over"), (0.0, 1.5), torch.Generator().manual_seed(seed), lambda error: None, 1.0 / SIDE
     )
@@ -90,7 +90,7 @@ def test_the_layer_at_fault_is_changed_below_another():
     red = Shape.of("circle", (1.0, 0.0, 0.0), center=(0.3, 0.3), radius=0.15)
     scene = Scene(SIDE, SIDE, (*started().layers, Layer((red,), 0.0)), (0.0, 0.0, 0.0))
     covered = render(Scene(SIDE, SIDE, (Layer((red,), 0.0),), None)).permute(1, 2, 0).numpy()
-    pixels = PICTURES["ring"] * (1.0 - covered[..., 3:]) + covered[..., :3]
+    pixels = np.ascontiguousarray(PICTURES["ring"] * (1.0 - covered[..., 3:]) + covered[..., :3])
     found, near = joined(pixels, ("circle",), scene)
     assert near >= 38.0
     assert [len(layer.shapes) for layer in found.layers] == [2, 1]

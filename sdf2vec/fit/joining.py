@@ -8,6 +8,7 @@ structure at a time in one tensor: kernels would have to be compiled for every s
 from __future__ import annotations
 
 import math
+import operator
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, replace
 from functools import partial
@@ -63,10 +64,11 @@ def join(scene: SceneTensors, coarse: View, fine: View, search: Search, most: in
     while left and most > 0:
         order = max(left, key=_faults(scene, coarse).__getitem__)
         left.remove(order)
-        (layer,) = _some(scene, partial(torch.Tensor.__eq__, order)).groups
+        (layer,) = _some(scene, partial(operator.eq, order)).groups
         found, tries = search.joined(layer, Surroundings.of(scene, order, *coarse), most)
         if found.layer is not layer:
-            scene = _replaced(scene, search.refined(found.layer, Surroundings.of(scene, order, *fine)))
+            layer = search.refined(found.layer, Surroundings.of(scene, order, *fine))
+            scene = _replaced(scene, replace(layer, order=torch.tensor([order])))
         most -= tries
         yield scene
 
