@@ -60,7 +60,7 @@ def join(scene: SceneTensors, coarse: View, fine: View, search: Search, most: in
 
     Tried at the resolution of one picture, refined at that of the other.
     """
-    left = list(range(scene.layer_count))
+    scene, left = _grounded(scene, coarse), list(range(scene.layer_count))
     while left and most > 0:
         order = max(left, key=_faults(scene, coarse).__getitem__)
         left.remove(order)
@@ -68,19 +68,42 @@ def join(scene: SceneTensors, coarse: View, fine: View, search: Search, most: in
         found, tries = search.joined(layer, Surroundings.of(scene, order, *coarse), most)
         if found.layer is not layer:
             layer = search.refined(found.layer, Surroundings.of(scene, order, *fine))
-            scene = _replaced(scene, replace(layer, order=torch.tensor([order])))
+            scene = _grounded(_replaced(scene, replace(layer, order=torch.tensor([order]))), fine)
         most -= tries
         yield scene
 
 
 def _faults(scene: SceneTensors, view: View) -> list[float]:
     """For each layer in draw order, how wrong the picture is where it covers."""
-    points = canvas(scene, view.target.shape[2], view.target.shape[1])
-    wrong = composite_points(scene, *points)[: len(view.target)] - view.target.flatten(1)
-    weighted = wrong if view.weights is None else wrong * view.weights.flatten()
-    covers, _ = layers_at(scene, *points)
-    faults: list[float] = (covers @ weighted.square().sum(0)).tolist()
+    covers, _ = layers_at(scene, *_points(scene, view))
+    faults: list[float] = (covers @ _wrong(scene, view)).tolist()
     return faults
+
+
+def _wrong(scene: SceneTensors, view: View) -> torch.Tensor:
+    """Squared errors [P] at the points of a picture, summed over the channels."""
+    wrong = composite_points(scene, *_points(scene, view))[: len(view.target)] - view.target.flatten(1)
+    return (wrong if view.weights is None else wrong * view.weights.flatten()).square().sum(0)
+
+
+def _points(scene: SceneTensors, view: View) -> tuple[torch.Tensor, torch.Tensor, torch.Tensor]:
+    x, y, pixel = canvas(scene, view.target.shape[2], view.target.shape[1])
+    return x, y, pixel
+
+
+def _grounded(scene: SceneTensors, view: View) -> SceneTensors:
+    """The scene on the median colour of the picture where the background is seen, if that is nearer to it."""
+    if scene.transparent:
+        return scene
+    light, dark = (
+        composite_points(replace(scene, background=torch.full((4,), end)), *_points(scene, view))
+        for end in (1.0, 0.0)
+    )
+    colors, order = view.target.flatten(1).sort(dim=1)
+    shares = (light - dark)[0][order].cumsum(1)
+    middle = (shares >= 0.5 * shares[:, -1:]).int().argmax(dim=1, keepdim=True)
+    grounded = replace(scene, background=torch.cat([colors.gather(1, middle)[:, 0], torch.ones(1)]))
+    return min(scene, grounded, key=lambda tried: float(_wrong(tried, view).sum()))
 
 
 def _replaced(scene: SceneTensors, layer: Group) -> SceneTensors:
