@@ -69,10 +69,17 @@ def test_a_hole_is_cut_out(name, kind):
     assert [joint.join for joint in layer.joints] == ["subtraction"]
 
 
-def test_what_does_not_help_is_not_kept():
+def test_a_disc_stays_one_circle():
     scene, near = joined(PICTURES["disc"], ("circle", "box"))
     assert near >= 38.0
     assert [shape.kind for shape in scene.layers[0].shapes] == ["circle"]
+
+
+def test_what_does_not_help_is_not_kept():
+    """No circle takes noise away."""
+    noise = np.random.default_rng(0).normal(0.0, 0.05, PICTURES["disc"].shape).astype(np.float32)
+    scene, _ = joined(PICTURES["disc"] + noise, ("circle",))
+    assert len(scene.layers[0].shapes) == 1
 
 
 def test_no_more_is_joined_than_asked_for():
