@@ -31,7 +31,7 @@ from .matching_pursuit import find_discs
 RESOLUTION = 40  # pixels squared at which candidates are tried
 STARTS = 3  # of each kind and join
 SCREENING, TRAINING = 6, 12  # steps of every candidate; of the best few after that
-FINALISTS, BEAM = 4, 2  # structures that are trained on; that go on to have more joined
+FINALISTS, BEAM = 9, 2  # structures that are trained on; that go on to have more joined
 REFINING = 20  # steps at the end
 MOST_JOINED = 24  # shapes in one layer
 FIRST_DAMPING, LESS, MORE = 0.1, 0.3, 5.0  # of a step; after one that helps, after one that does not
