@@ -11,6 +11,8 @@ from dataclasses import dataclass
 import torch
 from torch.optim.adam import adam as adam_step
 
+from ..units import Unit
+
 BETAS = (0.9, 0.99)
 EPSILON = 1e-12
 
@@ -82,3 +84,8 @@ def _kept(memory: torch.Tensor, after: torch.Tensor, rows: torch.Tensor) -> torc
     kept = torch.zeros_like(after).detach()
     kept[: len(rows)] = memory[rows.to(memory.device)]
     return kept
+
+
+def rate_of(unit: Unit, canvas: float, crowd: float) -> float:
+    """Adam's rate for a canvas of this size, the square root of its area; `crowd` is the factor for many layers."""
+    return unit.rate * (crowd if unit.crowded else 1.0) * canvas**unit.scaling

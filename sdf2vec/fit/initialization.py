@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 import torch
@@ -11,7 +12,7 @@ from ..blend import COMPOSITING, UNION
 from ..layer import Part, Structure, slots
 from ..paints import FLAT
 from ..render.tensors import Group, SceneTensors
-from ..units import COLOR, FALLOFF, OPACITY, SMOOTHNESS, Placed
+from ..units import COLOR, FALLOFF, OPACITY, SMOOTHNESS, Parameter, Placed
 from .presets import Start
 
 UNIFORM_SHARE = 0.35  # of the shapes goes anywhere, the rest where the picture changes
@@ -186,11 +187,11 @@ def _group(
         SMOOTHNESS.name: places.sizes[:, None] * START_SMOOTHNESS,
         COLOR.name: places.colors[:, :3],
     }
-    values = {
-        slot: looks[unit.name].clone()
-        if unit.start is None
-        else unit.start(slot.parameter.start, placed[slot.part or 0])
-        for slot in slots(structure)
-        for unit in [slot.parameter.unit]
-    }
+    values = {slot: start_of(slot.parameter, placed[slot.part or 0], looks) for slot in slots(structure)}
     return Group(structure, order, values)
+
+
+def start_of(parameter: Parameter, placed: Placed, looks: Mapping[str, torch.Tensor]) -> torch.Tensor:
+    """Where a parameter starts [N, width]: by its unit, or in `looks` by the unit's name."""
+    unit = parameter.unit
+    return looks[unit.name].clone() if unit.start is None else unit.start(parameter.start, placed)

@@ -19,12 +19,14 @@ from ..render import fused
 from ..render.tensors import Group, SceneTensors, from_scene, on_device, to_scene
 from ..scene import Scene
 from ..threads import threads_of_its_own
-from ..units import BACKGROUND, OPACITY, Unit
-from .adam import Adam
+from ..units import BACKGROUND, OPACITY
+from .adam import Adam, rate_of
 from .backends import Backend, choose
 from .constraints import enforce_min_thickness, project, too_small
 from .growth import densify, exchange, importance, prune, relocate
 from .initialization import Layers, background_of, empty_groups, place
+from .joining import RESOLUTION as JOIN_RESOLUTION
+from .joining import Search, View, join
 from .losses import Objective, objective
 from .presets import CROWDING, MANY, Phase, Start
 from .settings import Settings, preset_of
@@ -32,6 +34,7 @@ from .weights import weights_for
 
 THICKEN_EVERY = 10  # steps
 AREA_WEIGHT = 1.0  # of the area constraint in the loss
+JOIN_STEPS = 150  # about, of one try to join a shape to a layer
 TRIAL_LAYERS, TRIAL_STEPS, TRIAL_RATE = 4, 60, 0.5
 REFIT_STEPS = 100  # after the colours have been restricted
 ANYWHERE = Start("uniform")
@@ -79,6 +82,11 @@ class Stage:
     target: torch.Tensor  # [C, H, W] premultiplied
     weights: torch.Tensor | None  # [H, W]
     measure: Objective
+
+    @property
+    def view(self) -> View:
+        """What it draws, on the CPU."""
+        return View(self.target.cpu(), None if self.weights is None else self.weights.cpu())
 
 
 class Fit:
@@ -128,13 +136,16 @@ class Fit:
                     self._train(stage, partial(_in_batch, batch, phase.batches))
         for _ in range(self.settings.trials):
             self._try(stage)
+        if self.settings.cuts:
+            self._join(stage)
 
     def _adam(self, frozen: tuple[str, ...] = ()) -> Adam:
         losses = {name for phase in self.phases for name, _ in phase.loss}
         return adam(self.tensors, self.preset.crowding if "ssim" in losses else CROWDING, frozen)
 
     def _count_steps(self) -> int:
-        steps = sum(phase.total for phase in self.phases) + self.settings.trials * TRIAL_STEPS
+        steps = sum(phase.total for phase in self.phases)
+        steps += self.settings.trials * TRIAL_STEPS + self.settings.cuts * JOIN_STEPS
         return steps + (REFIT_STEPS if self.settings.palette or self.settings.colors else 0)
 
     def _start(self) -> SceneTensors:
@@ -199,9 +210,7 @@ class Fit:
                 self._relocate(stage, phase.relocation.share)
             loss = self._step(stage, rate, moves)
             self.done += 1
-            if self.callback(Progress(phase.name, self.done, self.steps, loss, self.backend.device)):
-                self.stopped = True
-                raise Stopped
+            self._report(phase, loss)
 
     def _step(self, stage: Stage, rate: float, moves: Callable[[Group], torch.Tensor] | None) -> float:
         self.optimizer.zero_grad()
@@ -244,6 +253,29 @@ class Fit:
             if worse:
                 self.tensors.groups = before
             self.optimizer = self._adam()
+
+    def _join(self, fine: Stage) -> None:
+        """Joins shapes to layers by trial, on the CPU."""
+        coarse = self._stage(Phase("joining", JOIN_STEPS * self.settings.cuts, JOIN_RESOLUTION))
+        last = self.done + coarse.phase.steps
+
+        def tick(loss: float) -> None:
+            self.done = min(self.done + 1, last)
+            self._report(coarse.phase, loss)
+
+        search = Search(_layers_of(self.settings), self.preset.falloff, self.generator, tick, self.pixel)
+        try:
+            scenes = join(on_device(self.tensors, "cpu"), coarse.view, fine.view, search, self.settings.cuts)
+            for scene in scenes:
+                self.tensors = on_device(scene, self.backend.device)
+        finally:  # also when stopped
+            self.optimizer = self._adam()
+        self.done = last
+
+    def _report(self, phase: Phase, loss: float) -> None:
+        if self.callback(Progress(phase.name, self.done, self.steps, loss, self.backend.device)):
+            self.stopped = True
+            raise Stopped
 
     def _restrict_colors(self, stage: Stage) -> None:
         """To the palette given or, of so many colours, the best."""
@@ -319,11 +351,6 @@ def adam(tensors: SceneTensors, crowding: float = CROWDING, frozen: tuple[str, .
     crowd = few ** (crowding if few < 1 else CROWDING)
     canvas = math.sqrt(tensors.size[0] * tensors.size[1])
     return Adam((tensor, rate_of(unit, canvas, crowd)) for unit, tensor in free if unit.name not in frozen)
-
-
-def rate_of(unit: Unit, canvas: float, crowd: float) -> float:
-    """Adam's rate for a canvas of this size, the square root of its area; `crowd` is the factor for many layers."""
-    return unit.rate * (crowd if unit.crowded else 1.0) * canvas**unit.scaling
 
 
 def _rates(phase: Phase) -> Iterator[float]:

@@ -51,6 +51,16 @@ MaxFalloff = Annotated[
 Trials = Annotated[
     int, number("number of trials", "T", 0, 10_000, "try a few shapes elsewhere at the end, T times")
 ]
+Cuts = Annotated[
+    int,
+    number(
+        "number of cuts",
+        "N",
+        0,
+        10_000,
+        "try to cut a shape from a layer, or join one to it, at the end, N times",
+    ),
+]
 Colors = Annotated[int, number("number of colours", "K", 1, MOST_COLORS, "how many colours there may be")]
 
 
@@ -74,6 +84,7 @@ class Settings(Struct, frozen=True):
     max_falloff: MaxFalloff | None = None
     start: Annotated[Scene | None, plain("a scene, or its file, to go on from, at any size", "SCENE")] = None
     trials: Trials = 0
+    cuts: Cuts = 0
     palette: Annotated[
         tuple[Color, ...], plain('the only colours there may be: "#123,#a0b1c2"', "COLORS")
     ] = ()
@@ -116,6 +127,10 @@ def _check_together(settings: Settings) -> None:
     shapes, union = settings.shapes, settings.union
     if shapes % union:
         raise Sdf2vecError(f"{shapes} shapes can't be joined by {union}: choose a multiple of {union}")
+    if settings.cuts and all(KINDS[name].patch is not None for name in settings.kind):
+        raise Sdf2vecError(
+            f"cuts need a kind of shape that can be joined with others, got {', '.join(settings.kind)}"
+        )
     preset_of(settings)
     if settings.palette and settings.colors:
         raise Sdf2vecError("either a palette or a number of colours, not both")

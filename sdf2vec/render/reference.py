@@ -100,14 +100,21 @@ def composite_points(
     for group in tensors.groups:
         cover, color = group_coverage(group, tensors.compositing, x, y, pixel)
         layers |= zip(group.order.tolist(), zip(cover, color, group.opacity[:, 0], strict=True), strict=True)
-    blend_color, blend_alpha = _blending(tensors.compositing)
-    rgb = tensors.background[:3, None].expand(3, len(x))
-    alpha = tensors.background[3:].expand(len(x))
+    image = tensors.background[:, None].expand(4, len(x))
     for index in sorted(layers):
         cover, color, opacity = layers[index]
-        (rgb,) = blend_color(rgb, color, opacity, cover)
-        (alpha,) = blend_alpha(alpha, opacity, cover)
-    return torch.cat([rgb, alpha[None]])
+        image = lay(tensors.compositing, image, color, opacity, cover)
+    return image
+
+
+def lay(
+    compositing: str, below: torch.Tensor, color: torch.Tensor, opacity: torch.Tensor, cover: torch.Tensor
+) -> torch.Tensor:
+    """Layers, each on what is below it [4, P]: colours [..., 3, P or 1], opacities [...], coverage [..., P]."""
+    blend_color, blend_alpha = _blending(compositing)
+    (rgb,) = blend_color(below[:3], color, opacity[..., None, None], cover[..., None, :])
+    (alpha,) = blend_alpha(below[3], opacity[..., None], cover)
+    return torch.cat([rgb, alpha[..., None, :]], dim=-2)
 
 
 def group_coverage(
