@@ -3,6 +3,7 @@
 import json
 import os
 import random
+from collections import Counter
 from importlib import import_module
 from importlib.util import find_spec
 
@@ -10,13 +11,13 @@ import numpy as np
 import pytest
 import torch
 
-from sdf2vec import Layer, Scene, Shape, dumps, loads
-from sdf2vec.api import export
+from sdf2vec import Exported, Layer, Scene, Shape, dumps, loads
+from sdf2vec.api import export, exported
 from sdf2vec.blend import COMPOSITING, JOINS, Join
 from sdf2vec.engines import chromium
-from sdf2vec.export import packing
-from sdf2vec.export.options import Options
-from sdf2vec.export.shader import shader
+from sdf2vec.engines.pages import ELEMENT
+from sdf2vec.export import EXPORTERS, Exporter, packing
+from sdf2vec.export.options import SVG_PROFILES, Options
 from sdf2vec.expr import (
     Expr,
     absolute,
@@ -47,7 +48,7 @@ from sdf2vec.shapes import KINDS, Kind, rotate
 from sdf2vec.units import ANGLE, COLOR, FREQUENCY, LENGTH, POSITION, Parameter
 
 from . import conftest
-from .test_component import PAGE, assert_shows, module
+from .test_component import assert_shows, module
 
 if not torch.cuda.is_available():  # before anything imports Triton
     os.environ.setdefault("TRITON_INTERPRET", "1")
@@ -237,32 +238,52 @@ def test_a_fit_starts_with_it_and_comes_nearer():
 def test_every_layout_of_a_shader_shows_it(layout, compositing, require_engine):
     require_engine("opengl")
     scene = toy_scene(compositing)
-    made = shader(scene, "glsl", Options(layout=layout))
-    assert compare(ROUND_TRIPS["glsl"][0], made.text, scene, (101, 67), made.data).largest_error <= 0.1
+    made = exported(scene, "glsl", layout=layout)
+    assert compare(ROUND_TRIPS["glsl"][0], made, scene, (101, 67)).largest_error <= 0.1
 
 
 @pytest.mark.parametrize("layout", ["readable", "data"])
 def test_webgpu_shows_it(layout, require_engine):
     require_engine("webgpu")
     scene = toy_scene()
-    made = shader(scene, "wgsl", Options(layout=layout))
-    assert compare(ROUND_TRIPS["wgsl"][0], made.text, scene, (101, 67), made.data).largest_error <= 0.1
+    made = exported(scene, "wgsl", layout=layout)
+    assert compare(ROUND_TRIPS["wgsl"][0], made, scene, (101, 67)).largest_error <= 0.1
 
 
 def test_it_is_packed_within_the_error(monkeypatch, require_engine):
     require_engine("opengl")
     monkeypatch.setattr(packing, "SAMPLE", 1 << 17)
     scene = toy_scene()
-    made = shader(scene, "shadertoy", Options(layout="packed"))
+    made = exported(scene, "shadertoy", layout="packed")
     assert 0.0 < made.error <= packing.LIMIT
-    result = compare(ROUND_TRIPS["shadertoy"][0], made.text, scene, (101, 67))
+    result = compare(ROUND_TRIPS["shadertoy"][0], made, scene, (101, 67))
     assert result.largest_error <= packing.LIMIT + 0.05
+
+
+@pytest.mark.parametrize("profile", SVG_PROFILES)
+def test_svg_shows_it(profile, require_engine):
+    """Its edges and its rings are traced: neither has an outline or a gradient of its own."""
+    require_engine("resvg")
+    scene = toy_scene(width=150, height=100)
+    made = exported(scene, "svg", svg_profile=profile)
+    (trip,) = (t for t in ROUND_TRIPS["svg"] if (t.engine, t.profile) == ("resvg", profile))
+    for size in ((150, 100), (300, 200)):
+        result = compare(trip, made, scene, size)
+        assert result.psnr >= 34, size
+        assert abs(result.mean_error) <= 1.0
+
+
+def test_a_page_shows_it(require_engine):
+    require_engine("page")
+    scene = toy_scene(width=90, height=60)
+    made = exported(scene, "html", alone=True)
+    assert compare(ROUND_TRIPS["html"][0], made, scene, (300, 200)).largest_error <= 1.1
 
 
 def test_the_web_component_shows_it(require_engine):
     require_engine("chromium")
     scene = toy_scene(width=90, height=60)
-    files = {"index.html": PAGE, "sdf-image.js": module(), "picture.scene.json": dumps(scene)}
+    files = {"index.html": ELEMENT, "sdf-image.js": module(), "picture.scene.json": dumps(scene)}
     with chromium.opened(files, 300, 200) as page:
         assert_shows(page, scene, 300, 200)
 
@@ -273,3 +294,15 @@ def test_pictures_and_files_are_exported():
     png = export(scene, "png")
     assert isinstance(png, bytes)
     assert png.startswith(b"\x89PNG")
+
+
+def test_a_target_of_its_own(monkeypatch):
+    """An exporter that only this module knows is found by name, and given the scene with what it alone knows."""
+
+    def count(scene: Scene, options: Options) -> Exported:
+        kinds = Counter(part.kind for layer in scene.layers for part in layer.structure)
+        return Exported(f"{options.title}: {kinds['waved']} waved", notes=("counted",))
+
+    monkeypatch.setitem(EXPORTERS, "count", Exporter(".count.txt", count, "how many"))
+    made = exported(toy_scene(layers=5), "count", title="a toy")
+    assert (made.raw, made.notes) == (b"a toy: 5 waved", ("counted",))

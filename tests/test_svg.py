@@ -12,7 +12,7 @@ import pytest
 import torch
 from skimage.morphology import dilation, footprint_rectangle
 
-from sdf2vec import KINDS, Layer, Scene, Sdf2vecError, Shape
+from sdf2vec import Layer, Scene, Sdf2vecError, Shape
 from sdf2vec.engines import ENGINES, chromium
 from sdf2vec.export.options import Options
 from sdf2vec.export.svg import accepts, data_uri, pdf
@@ -22,8 +22,9 @@ from sdf2vec.export.svg.canvas import Canvas
 from sdf2vec.export.svg.outlines import edge_of
 from sdf2vec.image import premultiply
 from sdf2vec.render.reference import render
+from sdf2vec.shapes import KINDS
 
-from .scenes import random_scene, random_shape
+from .scenes import SOFT, random_scene, random_shape
 
 NAMESPACE = "{http://www.w3.org/2000/svg}"
 Parameters = dict[str, float | tuple[float, ...]]
@@ -162,7 +163,7 @@ def test_portable_has_neither_filters_nor_blend_modes():
 
 
 def test_a_size_limit_is_kept_or_refused():
-    scene = random_scene(("box", "triangle"), layers=40, seed=7, unions={})
+    scene = random_scene(("box", "triangle"), layers=40, seed=7, paints=("flat",), joins=())
     free = len(text_of(scene).encode())
     assert len(text_of(scene, svg_size_limit=free).encode()) == free
     limited = write_svg(scene, Options(svg_size_limit=free // 2))
@@ -184,7 +185,7 @@ def test_unions_of_many_colours_mix_as_in_the_render(engine, require_engine):
     require_engine(engine)
     r = random.Random(2)
     for kind, falloff, opacity in (("circle", 0.05, 0.8), ("triangle", 0.1, 1.0), ("box", 0.0, 1.0)):
-        union = Layer(tuple(random_shape(kind, r) for _ in range(3)), falloff, opacity, 0.06)
+        union = Layer.union([random_shape(kind, r) for _ in range(3)], 0.06, falloff, opacity)
         scene = Scene(150, 100, (union,), (0.2, 0.3, 0.4))
         text = text_of(scene, svg_profile="portable")
         for size in ((150, 100), (390, 260)):
@@ -332,7 +333,7 @@ SHARP: dict[str, Parameters] = {
 
 
 @pytest.mark.parametrize("falloff", [0.0, 0.01])
-@pytest.mark.parametrize("kind", sorted(KINDS))
+@pytest.mark.parametrize("kind", SOFT)
 def test_sharp_shapes_away_from_their_edges(levels_off, kind, falloff):
     scene = scene_of(Layer((Shape.of(kind, ORANGE, **SHARP[kind]),), falloff, 0.8), background=(0.2, 0, 0.5))
     inner = away_from_edges(scene)
@@ -344,7 +345,7 @@ def test_sharp_shapes_away_from_their_edges(levels_off, kind, falloff):
 
 def test_sharp_unions_are_traced(levels_off):
     shapes = tuple(Shape.of("circle", ORANGE, center=(x, 0.0), radius=0.2) for x in (-0.2, 0.2))
-    scene = scene_of(Layer(shapes, 0.0, 1.0, 0.05))
+    scene = scene_of(Layer.union(shapes, 0.05, 0.0))
     assert len(parsed(scene).findall(f".//{NAMESPACE}path")) == 1
     off = levels_off(scene)
     assert off[away_from_edges(scene)].max() <= 1
@@ -356,7 +357,7 @@ def test_a_union_around_a_hole(levels_off):
         Shape.of("circle", WHITE, center=(0.3 * math.cos(a), 0.3 * math.sin(a)), radius=0.08)
         for a in np.arange(0, 6.2, 0.4)
     ]
-    scene = scene_of(Layer(tuple(ring), 0.0, 1.0, 0.01))
+    scene = scene_of(Layer.union(ring, 0.01, 0.0))
     assert levels_off(scene)[50, 75, :3].max() == 0
     assert levels_off(scene)[away_from_edges(scene)].max() <= 1
 
@@ -443,7 +444,7 @@ def test_a_point_of_a_triangle_is_no_error():
 def test_a_mixed_scene(levels_off):
     """Without unions, whose colours are averaged, and without opacity where outlines cross."""
     kept = [layer for layer in random_scene(layers=20, seed=5).layers if len(layer.shapes) == 1]
-    assert {layer.kind for layer in kept} == set(KINDS)
+    assert {layer.shapes[0].kind for layer in kept} == set(KINDS)
     assert levels_off(Scene(120, 80, tuple(kept), ORANGE)).mean() < 1.5
 
 
@@ -485,7 +486,7 @@ def soft_scene(background=(0.3, 0.4, 0.5)):
     r = random.Random(3)
     layers = []
     for index in range(12):
-        shape = random_shape(sorted(KINDS)[index % 5], r)
+        shape = random_shape(sorted(SOFT)[index % 5], r)
         layers.append(Layer((shape,), r.uniform(0.05, 0.4), r.uniform(0.3, 1.0)))
     return Scene(150, 100, tuple(layers), background)
 
