@@ -18,6 +18,8 @@ from sdf2vec.fit.presets import PRESETS
 from sdf2vec.fit.settings import LOSS_NAMES, kinds_of, losses_of, settings_of
 from sdf2vec.image import load
 
+from .scenes import SOFT
+
 if TYPE_CHECKING:
     from sdf2vec.fit.loop import Progress
 
@@ -74,9 +76,9 @@ def test_settings_matter_and_defaults_are_said(levels):
     assert fit(levels, seed=1) == fit(levels, seed=1)
     assert fit(levels, seed=1) != fit(levels, seed=2)
     assert fit(levels, seed=np.int64(1)) == fit(levels, seed=1)
-    assert {layer.kind for layer in fit(levels).layers} == {"triangle"}
-    assert {layer.kind for layer in fit(levels, kind=["circle"]).layers} == {"circle"}
-    assert {layer.kind for layer in fit(levels, 40, kind="mixed").layers} == set(sdf2vec.KINDS)
+    assert {layer.shapes[0].kind for layer in fit(levels).layers} == {"triangle"}
+    assert {layer.shapes[0].kind for layer in fit(levels, kind=["circle"]).layers} == {"circle"}
+    assert {layer.shapes[0].kind for layer in fit(levels, 40, kind="mixed").layers} == set(SOFT)
     assert fit(levels, compositing="additive").compositing == "additive"
     assert fit(levels, loss="mse") != fit(levels, loss="l1")
     assert settings_of().shapes == 256
@@ -85,7 +87,7 @@ def test_settings_matter_and_defaults_are_said(levels):
 def test_names_of_kinds():
     assert kinds_of("box") == ("box",)
     assert kinds_of(["box", "circle", "box"]) == ("circle", "box")
-    assert kinds_of("mixed") == kinds_of(["box", "mixed"]) == tuple(sdf2vec.KINDS)
+    assert kinds_of("mixed") == kinds_of(["box", "mixed"]) == SOFT
 
 
 def test_transparency_is_kept(levels):

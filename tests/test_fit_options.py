@@ -100,8 +100,8 @@ def test_fewer_shapes_leave_out_what_matters_least():
     fit = Fit(pic, settings_of(3, kind="circle", preset="fast", start=start), lambda progress: False)
     (group,) = fit.tensors.groups
     assert group.order.tolist() == [0, 1, 2]
-    assert group.parameters["center"][:, 0, 0].tolist() == [-0.5, 0.0, 0.5]
-    assert group.colors[:, 0].tolist() == [list(RED)] * 3
+    assert group.of("center", 0)[:, 0].tolist() == [-0.5, 0.0, 0.5]
+    assert group.colors[0].tolist() == [list(RED)] * 3
 
 
 def test_more_shapes_come_on_top_and_help():
@@ -111,7 +111,7 @@ def test_more_shapes_come_on_top_and_help():
     assert group.order.tolist() == list(range(9))
     assert fit.tensors.layer_count == 9
     kept = [layer.shapes[0].parameters[2] for layer in start.layers]
-    assert group.parameters["radius"][:3].flatten().tolist() == pytest.approx(kept)
+    assert group.of("radius", 0)[:3].flatten().tolist() == pytest.approx(kept)
     assert error(fitted(pic, 9, start=start), pic) < error(fitted(pic, 3, start=start), pic)
 
 
@@ -147,7 +147,7 @@ def test_a_single_union_larger_than_what_is_asked_gives_way():
 def test_a_start_of_another_kind_keeps_its_shapes_and_gets_the_new_kind():
     start = fitted(shapes=4)
     scene = fitted(shapes=6, kind="ellipse", start=start)
-    assert sorted(layer.kind for layer in scene.layers) == ["circle"] * 4 + ["ellipse"] * 2
+    assert sorted(layer.shapes[0].kind for layer in scene.layers) == ["circle"] * 4 + ["ellipse"] * 2
 
 
 def test_an_empty_start():
@@ -233,7 +233,7 @@ def test_snapping_takes_what_looks_nearest():
     )
     tensors = from_scene(Scene(48, 32, layers, (0.9, 0.9, 0.8)))
     palette.snap(tensors, [RED, BLUE, (1.0, 1.0, 1.0)])
-    assert tensors.groups[0].colors[:, 0].tolist() == [list(RED), list(BLUE)]
+    assert tensors.groups[0].colors[0].tolist() == [list(RED), list(BLUE)]
     assert tensors.background.tolist() == [1.0, 1.0, 1.0, 1.0]
 
 
@@ -369,7 +369,7 @@ def test_sharp_shapes_learn_where_their_edges_are():
 def test_unions():
     scene = fitted(shapes=6, union=2)
     assert [len(layer.shapes) for layer in scene.layers] == [2, 2, 2]
-    assert all(layer.smoothness > 0 for layer in scene.layers)
+    assert all(joint.smoothness > 0 for layer in scene.layers for joint in layer.joints)
     flat = Scene(48, 32, (), tuple(as_tensor(picture()).mean(dim=(1, 2)).tolist()))
     assert error(scene, picture()) < 0.3 * error(flat, picture())
 
@@ -481,7 +481,7 @@ def test_a_batch_leaves_the_others_alone():
 
     def state():
         return {
-            int(order): torch.cat([t.detach()[row].flatten() for _, t in group.tensors()])
+            int(order): torch.cat([t.detach()[row] for t in group.values.values()])
             for group in fit.tensors.groups
             for row, order in enumerate(group.order)
         }

@@ -216,7 +216,7 @@ def _cell_of(grid, x, y):
 def _coverages(scene, x, y):
     found: dict[int, np.ndarray] = {}
     for group in from_scene(scene, torch.float64).groups:
-        cover, _ = group_coverage(group, x, y, torch.tensor(COARSEST, dtype=torch.float64))
+        cover, _ = group_coverage(group, scene.compositing, x, y, torch.tensor(COARSEST, dtype=torch.float64))
         found |= dict(zip(group.order.tolist(), cover.numpy(), strict=True))
     return np.stack([found[i] for i in range(len(found))])
 

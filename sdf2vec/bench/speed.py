@@ -26,6 +26,7 @@ from ..fit.initialization import Layers, place
 from ..fit.loop import adam
 from ..fit.losses import l1
 from ..fit.presets import Start
+from ..fit.settings import MIXED, kinds_of
 from ..fit.ssim import Dissimilarity
 from ..layer import Formula, Part
 from ..lower.block import dependent, derivatives
@@ -45,7 +46,7 @@ def picture(side: int) -> torch.Tensor:
     return torch.stack([wave * (0.6 + 0.4 * discs) for wave in waves])
 
 
-def scene(kinds: list[str], count: int, target: torch.Tensor, compositing: str = "over") -> SceneTensors:
+def scene(kinds: Sequence[str], count: int, target: torch.Tensor, compositing: str = "over") -> SceneTensors:
     """What a fit starts with."""
     layers = Layers(tuple(kinds), compositing)
     return place(target, (1.0, 1.0), layers, count, Start(), torch.Generator().manual_seed(0))
@@ -87,8 +88,8 @@ def against_dense() -> Iterator[str]:
     yield "| kind | dense ms | fused ms | times faster |"
     yield "|---|---:|---:|---:|"
     target = picture(256)
-    for kind in (*KINDS, "mixed"):
-        kinds = list(KINDS) if kind == "mixed" else [kind]
+    for kind in (*KINDS, MIXED):
+        kinds = kinds_of(kind)
         slow = seconds(step(scene(kinds, 256, target), target, dense=True), least=0.1)
         with threads_of_its_own():
             fast = seconds(step(scene(kinds, 256, target), target, dense=False))
@@ -105,7 +106,7 @@ def per_shape_pixel() -> Iterator[str]:
     target = picture(256)
     os.environ["SDF2VEC_THREADS"] = "1"
     for kind in KINDS:
-        tensors = scene([kind], 256, target)
+        tensors = scene((kind,), 256, target)
         weights = torch.randn(3, 256, 256, generator=torch.Generator().manual_seed(0))
         for group in tensors.groups:
             for tensor in group.values.values():
@@ -184,7 +185,7 @@ def growth() -> Iterator[Grown]:
     for count in (64, 256, 1024, 4096, 8192):
         for side in (128, 256, 512, 1024):
             target = picture(side)
-            tensors = scene(["triangle"], count, target)
+            tensors = scene(("triangle",), count, target)
             with threads_of_its_own():
                 spent = seconds(step(tensors, target, dense=False), least=0.3)
                 bins = fused.bins_of(tensors, side, side)
