@@ -185,9 +185,7 @@ class Shape:
         object.__setattr__(self, "color", numbers_of((BASE,), {BASE.name: self.color}))
 
     @classmethod
-    def of(
-        cls, kind: str, color: Color = BLACK, paint: str = FLAT, **values: float | Sequence[float]
-    ) -> Shape:
+    def of(cls, kind: str, color: Color = BLACK, paint: str = FLAT, **values: Any) -> Shape:
         """A shape from parameters by name: `Shape.of("circle", (1, 0, 0), center=(0, 0), radius=0.2)`."""
         part = Part(one_of(kind, "kind", KINDS), one_of(paint, "paint", PAINTS))
         return cls.from_numbers(part, iter(numbers_of(part.parameters, {BASE.name: color, **values})))
