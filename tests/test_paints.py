@@ -83,7 +83,10 @@ def test_a_shape_of_no_size_has_a_colour():
 def test_the_ramp_is_where_the_colours_end(direction):
     ramp = PAINTS["linear"].ramp
     assert ramp is not None
-    for point, color in zip(ramp(LAST, direction), (FIRST, LAST), strict=True):
+    slope, first, last = ramp(FIRST, LAST, direction)
+    steepness = slope[0] ** 2 + slope[1] ** 2
+    for side, color in ((-0.5, first), (0.5, last)):
+        point = (side * slope[0] / steepness, side * slope[1] / steepness)
         found = linear_paint(vec2(*point), vec3(*FIRST), vec3(*LAST), vec2(*direction))
         assert [constant(part) for part in scalarize(found)] == pytest.approx(color)
 
