@@ -12,7 +12,9 @@ import os
 import time
 from collections.abc import Iterator
 from dataclasses import dataclass
+from itertools import product
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import torch
@@ -32,24 +34,28 @@ class Row:
 
     picture: str
     kind: str
+    paint: str
     compositing: str
     shapes: int
+    numbers: int
     psnr: float
     ssim: float
     flip: float
     seconds: float
 
 
-def measure(path: Path, kind: str, compositing: str, shapes: int, preset: str, seed: int) -> Row:
-    """Fits one picture and compares the render at its full size, 8 bits a channel."""
+def measure(path: Path, shapes: int, **options: Any) -> Row:
+    """Fits one picture, with options as in `api.fit`, and compares the render at its full size, 8 bits a channel."""
     picture = load(path)
     started = time.perf_counter()
-    scene = api.fit(picture, shapes, kind=kind, compositing=compositing, preset=preset, seed=seed)
+    scene = api.fit(picture, shapes, **options)
     seconds = time.perf_counter() - started
     target = _tensor(picture)
     drawn = _eight_bits(scene)[: len(target)]
     values = float(psnr(drawn, target)), float(ssim(drawn, target)), float(flip(drawn, target))
-    return Row(path.stem, kind, compositing, shapes, *values, seconds)
+    numbers = sum(len(layer.numbers) for layer in scene.layers)
+    names = (options["kind"], options["paint"], options["compositing"])
+    return Row(path.stem, *names, shapes, numbers, *values, seconds)
 
 
 def _eight_bits(scene: Scene) -> torch.Tensor:
@@ -71,11 +77,11 @@ def table(rows: list[Row], command: str) -> str:
         "",
         f"    {command}",
         "",
-        "| picture | kind | compositing | shapes | PSNR dB | SSIM | FLIP | seconds |",
-        "|---|---|---|---:|---:|---:|---:|---:|",
+        "| picture | kind | paint | compositing | shapes | numbers | PSNR dB | SSIM | FLIP | seconds |",
+        "|---|---|---|---|---:|---:|---:|---:|---:|---:|",
     )
     body = (
-        f"| {r.picture} | {r.kind} | {r.compositing} | {r.shapes} "
+        f"| {r.picture} | {r.kind} | {r.paint} | {r.compositing} | {r.shapes} | {r.numbers} "
         f"| {r.psnr:.2f} | {r.ssim:.4f} | {r.flip:.4f} | {r.seconds:.1f} |"
         for r in rows
     )
@@ -83,13 +89,12 @@ def table(rows: list[Row], command: str) -> str:
 
 
 def _rows(options: argparse.Namespace) -> Iterator[Row]:
-    for path in options.pictures:
-        for kind in options.kinds.split(","):
-            for compositing in options.compositing.split(","):
-                for shapes in map(int, options.shapes.split(",")):
-                    row = measure(path, kind, compositing, shapes, options.preset, options.seed)
-                    print(row, flush=True)
-                    yield row
+    shared = {"preset": options.preset, "seed": options.seed}
+    lists = (text.split(",") for text in (options.kinds, options.paints, options.compositing, options.shapes))
+    for path, (kind, paint, compositing, shapes) in product(options.pictures, list(product(*lists))):
+        row = measure(path, int(shapes), kind=kind, paint=paint, compositing=compositing, **shared)
+        print(row, flush=True)
+        yield row
 
 
 def main() -> None:
@@ -98,6 +103,7 @@ def main() -> None:
     parser.add_argument("pictures", nargs="+", type=Path)
     parser.add_argument("--shapes", default="64", help="numbers, separated by commas")
     parser.add_argument("--kinds", default="circle,ellipse,box,triangle,displaced,mixed")
+    parser.add_argument("--paints", default="flat")
     parser.add_argument("--compositing", default="over,additive")
     parser.add_argument("--preset", default="balanced")
     parser.add_argument("--seed", type=int, default=0)
@@ -106,7 +112,7 @@ def main() -> None:
     names = " ".join(map(str, options.pictures))
     command = (
         f"python -m sdf2vec.bench.quality {names} --shapes {options.shapes} --kinds {options.kinds} "
-        f"--compositing {options.compositing} --preset {options.preset} --seed {options.seed} "
+        f"--paints {options.paints} --compositing {options.compositing} --preset {options.preset} --seed {options.seed} "
         f"-o {options.output}"
     )
     write_atomically(options.output, table(list(_rows(options)), command).encode())
