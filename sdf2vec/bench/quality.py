@@ -112,8 +112,8 @@ def main() -> None:
     names = " ".join(map(str, options.pictures))
     command = (
         f"python -m sdf2vec.bench.quality {names} --shapes {options.shapes} --kinds {options.kinds} "
-        f"--paints {options.paints} --compositing {options.compositing} --preset {options.preset} --seed {options.seed} "
-        f"-o {options.output}"
+        f"--paints {options.paints} --compositing {options.compositing} --preset {options.preset} "
+        f"--seed {options.seed} -o {options.output}"
     )
     write_atomically(options.output, table(list(_rows(options)), command).encode())
 
