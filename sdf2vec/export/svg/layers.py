@@ -70,7 +70,7 @@ class Painter:
             return self._patch(layer, index)
         lift = self.lift if blurred is not None and blurred.deviation else 0.0
         fill, error = fill_of(layer, canvas, lift)
-        if error > MIXED * self.detail.levels:
+        if error > MIXED * self.detail.levels and len(layer.seen) > 1:
             return self._parts(layer, self.plan.bands[index])
         if self.detail.grain:
             return figure(layer, blurred, canvas) if blurred else None
