@@ -19,8 +19,9 @@ approximate_polygon: Callable[[Points, float], Points] = deferred("skimage.measu
 
 
 def smooth_path(contours: Sequence[Points], tolerance: float, canvas: Canvas) -> Path:
-    """Closed contours [M, 2] in user units as curves, at most about `tolerance` away from them."""
-    return Path(tuple(_smooth(contour, tolerance, canvas) for contour in contours))
+    """Closed contours [M, 2] in user units as curves, at most about `tolerance` away from them; no points."""
+    curves = (_smooth(contour, tolerance, canvas) for contour in contours)
+    return Path(tuple(curve for curve in curves if curve.segments))
 
 
 def straight_path(contours: Sequence[Points], tolerance: float, canvas: Canvas) -> Path:

@@ -14,7 +14,7 @@ from .bezier_fit import smooth_path, straight_path
 from .blur import Blurred
 from .canvas import Canvas
 from .compact import figure
-from .display import Drawing, Figure, Group, Item, LinearGradient
+from .display import Drawing, Figure, Group, Item, LinearGradient, Path
 from .gradients import SoftEdge, ellipse, radial, sliced
 from .isobands import (
     Band,
@@ -38,6 +38,7 @@ PARTS_COARSER = 8.0  # the parts of a union are dearer than other bands: every s
 NARROW = 12.0  # pixels: bands of a softer edge need no antialiasing
 LOOSEST = 1.0  # user units that a contour of a soft edge may be off
 MIXED = 7.5  # by so much more than the stops of an edge may a gradient through a union be off
+NOWHERE = Path(())  # of a contour that no place on the canvas reaches
 
 
 def drawing(scene: Scene, plan: Plan, detail: Detail) -> Drawing:
@@ -63,7 +64,9 @@ class Painter:
     def draw(self, layer: Layer, index: int) -> Item | None:
         """A layer; None where nothing can be seen."""
         item = self._drawn(layer, index)
-        return replace(item, name=f"{layer.shapes[0].kind}-{index + 1}") if item else None
+        if item is None or (isinstance(item, Figure) and item.geometry == NOWHERE):
+            return None
+        return replace(item, name=f"{layer.shapes[0].kind}-{index + 1}")
 
     def _drawn(self, layer: Layer, index: int) -> Item | None:
         canvas, blurred = self.plan.canvas, self.plan.blurred.get(index)
@@ -71,7 +74,7 @@ class Painter:
             return self._patch(layer, index)
         lift = self.lift if blurred is not None and blurred.deviation else 0.0
         fill, error = fill_of(layer, canvas, lift)
-        if error > MIXED * self.detail.levels:
+        if error > MIXED * self.detail.levels and len(layer.seen) > 1:
             return self._parts(layer, self.plan.bands[index])
         if self.detail.grain:
             return figure(layer, blurred, canvas) if blurred else None
@@ -86,9 +89,7 @@ class Painter:
         if outline is not None:
             return Figure(placed(outline, self.plan.canvas), fill, layer.opacity)
         found = layer_contours(layer, [0.5], self.plan.canvas)
-        if not found or not found[0].contours:
-            return None
-        path = smooth_path(found[0].contours, TOLERANCE, self.plan.canvas)
+        path = smooth_path(found[0].contours, TOLERANCE, self.plan.canvas) if found else NOWHERE
         return Figure(path, fill, layer.opacity)
 
     def _soft(self, layer: Layer, index: int, fill: Color | LinearGradient) -> Item | None:
