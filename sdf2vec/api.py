@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Sequence
 from typing import TYPE_CHECKING, Any
 
-from .arrays import Float32Array
 from .declared import checked, documented
 from .deferred import deferred
 from .export.exported import Exported
@@ -15,6 +14,7 @@ from .fit.settings import Settings, settings_of
 from .scene import Scene
 
 if TYPE_CHECKING:
+    from .arrays import Float32Array
     from .fit.loop import Progress
     from .image import Picture
     from .roundtrip import Check, Size

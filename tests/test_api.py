@@ -78,7 +78,7 @@ def test_settings_matter_and_defaults_are_said(levels):
     assert fit(levels, seed=np.int64(1)) == fit(levels, seed=1)
     assert {layer.shapes[0].kind for layer in fit(levels).layers} == {"triangle"}
     assert {layer.shapes[0].kind for layer in fit(levels, kind=["circle"]).layers} == {"circle"}
-    assert {layer.shapes[0].kind for layer in fit(levels, 40, kind="mixed").layers} == set(SOFT)
+    assert {layer.shapes[0].kind for layer in fit(levels, 12, kind="circle,box").layers} == {"circle", "box"}
     assert fit(levels, compositing="additive").compositing == "additive"
     assert fit(levels, loss="mse") != fit(levels, loss="l1")
     assert settings_of().shapes == 256
