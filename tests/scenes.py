@@ -80,7 +80,7 @@ def random_scene(
 
 
 # Every kind, paint and join, in families of few structures: each structure costs seconds to compile.
-FAMILIES = {
+FAMILIES: dict[str, list[Structure]] = {
     "plain": [(Part("circle"),), (Part("box"),)],
     "union": [(Part("circle"), Part("triangle", "linear", "union")), (Part("ellipse", "linear"),)],
     "cut": [
@@ -99,4 +99,4 @@ def scene_of(family, compositing="over", layers=12, seed=0, size=(60, 40), trans
         random_layer_of(FAMILIES[family][i % len(FAMILIES[family])], r, compositing) for i in range(count)
     ]
     background = None if transparent else (r.random(), r.random(), r.random())
-    return Scene(*size, tuple(made), background, compositing)
+    return Scene(size[0], size[1], tuple(made), background, compositing)
