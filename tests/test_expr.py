@@ -120,7 +120,7 @@ def test_substitute_folds_anew():
 
 def test_hoist_finds_the_largest_constant_parts():
     root = length(p - vec2(a, b)) - sin(a * 2.0) * p.x
-    assert set(hoist(root, p)) == {vec2(a, b), sin(a * 2.0)}
+    assert set(hoist(root, (p,))) == {vec2(a, b), sin(a * 2.0)}
 
 
 def test_every_row_is_complete_and_every_operation_has_a_meaning():
