@@ -110,7 +110,7 @@ EXCLUSION = Join("exclusion", "^", lambda a, b, smoothness: exclusion(a, b), add
 
 STRUCTURES = [
     (Part("waved", "rings"),),
-    (Part("circle"), Part("waved", "rings", "exclusion"), Part("circle", join="subtraction")),
+    (Part("circle"), Part("waved", "rings", "exclusion")),
 ]
 
 

@@ -168,7 +168,7 @@ def test_kernel_text_is_plain_python():
 
 
 def test_large_scenes_are_drawn_by_the_fused_renderer_and_look_the_same(monkeypatch):
-    scene = scene_of("union", seed=5)
+    scene = scene_of("plain", seed=5)
     dense = draw.draw(scene, 50, 40)
     assert torch.equal(dense, reference.render(scene, 50, 40))
     monkeypatch.setattr(draw, "LARGE", 0)

@@ -85,8 +85,8 @@ FUNCTIONS = {"sqrt": math.sqrt, "log": math.log, "exp": math.exp}
 def folded(node: ast.AST) -> float | None:
     """The value of an expression of numbers only."""
     match node:
-        case ast.Constant(value=int() | float() as value):
-            return float(value)
+        case ast.Constant(value=int() | float() as number):
+            return float(number)
         case ast.UnaryOp(op=ast.USub(), operand=inner):
             value = folded(inner)
             return None if value is None else -value
