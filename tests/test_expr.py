@@ -113,11 +113,7 @@ def test_substitute_folds_anew():
 
 def test_hoist_finds_the_largest_constant_parts():
     root = length(p - vec2(a, b)) - sin(a * 2.0) * p.x
-<<<<<<< HEAD
     assert set(hoist(root, {p})) == {vec2(a, b), sin(a * 2.0)}
-=======
-    assert set(hoist(root, (p,))) == {vec2(a, b), sin(a * 2.0)}
->>>>>>> tests
 
 
 def test_every_row_is_complete_and_every_operation_has_a_meaning():

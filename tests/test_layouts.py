@@ -7,12 +7,8 @@ import numpy as np
 import pytest
 import torch
 
-<<<<<<< HEAD
 import sdf2vec
-from sdf2vec import Layer, Scene, Sdf2vecError, Shape
-=======
 from sdf2vec import Joint, Layer, Scene, Sdf2vecError, Shape
->>>>>>> tests
 from sdf2vec.engines import glslang_validate
 from sdf2vec.export import packing
 from sdf2vec.export.exported import Exported
@@ -99,13 +95,8 @@ def test_storage_buffer_agrees_with_statements(compositing, require_engine):
 @pytest.mark.parametrize("kinds", [("circle",), tuple(KINDS)])
 def test_packed_is_within_its_error(kinds, compositing, require_engine):
     require_engine("opengl")
-<<<<<<< HEAD
-    scene = random_scene(kinds, compositing, layers=16, seed=6)
-    made = sdf2vec.exported(scene, "shadertoy", layout="packed")
-=======
     scene = smoothed(random_scene(kinds, compositing, layers=16, seed=6))
-    made = shader(scene, "shadertoy", Options(layout="packed"))
->>>>>>> tests
+    made = sdf2vec.exported(scene, "shadertoy", layout="packed")
     assert 0.0 < made.error <= packing.LIMIT
     for size in SIZES:
         result = compare(ROUND_TRIPS["shadertoy"][0], made, scene, size)
@@ -161,13 +152,8 @@ def test_constant_tables_have_a_limit(require_engine):
 def test_odd_canvases(layout, size, require_engine, monkeypatch):
     require_engine("opengl")
     monkeypatch.setattr(packing, "SAMPLE", 1 << 21)  # a picture that is a strip of the canvas
-<<<<<<< HEAD
-    scene = random_scene(width=size[0], height=size[1], seed=8, layers=9)
-    made = sdf2vec.exported(scene, "glsl", layout=layout)
-=======
     scene = smoothed(random_scene(width=size[0], height=size[1], seed=8, layers=9))
-    made = shader(scene, "glsl", Options(layout=layout))
->>>>>>> tests
+    made = sdf2vec.exported(scene, "glsl", layout=layout)
     for canvas in (size, (50, 130)):
         result = compare(ROUND_TRIPS["glsl"][0], made, scene, canvas)
         assert result.largest_error <= (1.0 if layout == "packed" else 0.1), canvas
