@@ -39,7 +39,7 @@ from sdf2vec.fit.initialization import Layers, place
 from sdf2vec.fit.loop import adam
 from sdf2vec.fit.presets import Start
 from sdf2vec.layer import Part
-from sdf2vec.operation import VEC4
+from sdf2vec.operation import FLOAT, VEC4
 from sdf2vec.paints import PAINTS, Paint
 from sdf2vec.render import culled, fused, reference, triton_fused
 from sdf2vec.render.tensors import from_scene, to_scene
@@ -100,13 +100,13 @@ RINGS = Paint(
 )
 
 
-@function("exclusion", a=VEC4, b=VEC4)
-def exclusion(a: Expr, b: Expr) -> Expr:
+@function("exclusion", a=VEC4, b=VEC4, smoothness=FLOAT)
+def exclusion(a: Expr, b: Expr, smoothness: Expr) -> Expr:
     nearer = mix(a, b, select(b.w < a.w, 1.0, 0.0))
     return vec4(nearer.x, nearer.y, nearer.z, maximum(minimum(a.w, b.w), -maximum(a.w, b.w)))
 
 
-EXCLUSION = Join("exclusion", "^", lambda a, b, smoothness: exclusion(a, b), adds=True)
+EXCLUSION = Join("exclusion", "^", exclusion, adds=True)
 
 STRUCTURES = [
     (Part("waved", "rings"),),

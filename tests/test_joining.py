@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 import pytest
 import torch
@@ -41,7 +43,11 @@ PICTURES = {
 
 def started(kind="circle"):
     """A small grey shape somewhere on black."""
-    values = {"circle": {"radius": 0.1}, "gaussian": {"radii": (0.1, 0.1), "angle": 0.0}}[kind]
+    known: dict[str, dict[str, Any]] = {
+        "circle": {"radius": 0.1},
+        "gaussian": {"radii": (0.1, 0.1), "angle": 0.0},
+    }
+    values = known[kind]
     shape = Shape.of(kind, (0.5, 0.5, 0.5), center=(0.2, -0.1), **values)
     return Scene(SIDE, SIDE, (Layer((shape,), 0.1),), (0.0, 0.0, 0.0))
 

@@ -109,8 +109,8 @@ def test_what_cuts_a_layer_may_lie_far_outside(join, require_engine):
     require_engine("opengl")
     shapes = (Shape("circle", (0, 0, 0.2), (1, 0, 0)), Shape("circle", (20.0, 0.05, 20.0)))
     scene = Scene(60, 40, (Layer(shapes, 0.02, 1.0, (Joint(join, 0.0),)),), (0, 0, 1))
-    made = shader(scene, "shadertoy", Options(layout="packed"))
-    assert compare(ROUND_TRIPS["shadertoy"][0], made.text, scene, (150, 100)).largest_error <= 1.0
+    made = sdf2vec.exported(scene, "shadertoy", layout="packed")
+    assert compare(ROUND_TRIPS["shadertoy"][0], made, scene, (150, 100)).largest_error <= 1.0
 
 
 def test_many_shapes(require_engine):

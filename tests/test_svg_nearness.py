@@ -5,6 +5,7 @@ import math
 import random
 import re
 from dataclasses import replace
+from typing import Any
 from xml.etree import ElementTree
 
 import numpy as np
@@ -30,7 +31,7 @@ from sdf2vec.render.reference import render
 
 from .scenes import random_shape
 
-Numbers = dict[str, float | tuple[float, ...]]
+Numbers = dict[str, Any]
 NAMESPACE = "{http://www.w3.org/2000/svg}"
 BLURRING = ["resvg", "librsvg", "chromium", "firefox"]
 
@@ -310,7 +311,7 @@ def test_the_smallest_drawing_says_a_triangle_in_few_bytes():
     layers = []
     for _ in range(256):
         x, y = r.uniform(-0.5, 0.5), r.uniform(-0.5, 0.5)
-        corners = {name: (x + r.gauss(0, 0.15), y + r.gauss(0, 0.15)) for name in "abc"}
+        corners: dict[str, Any] = {name: (x + r.gauss(0, 0.15), y + r.gauss(0, 0.15)) for name in "abc"}
         color = (r.random(), r.random(), r.random())
         layers.append(
             Layer((Shape.of("triangle", color, **corners),), r.uniform(0.01, 0.2), r.uniform(0.4, 1.0))
