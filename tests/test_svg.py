@@ -5,6 +5,7 @@ import math
 import random
 import re
 from dataclasses import replace
+from typing import Any
 from xml.etree import ElementTree
 
 import numpy as np
@@ -27,7 +28,7 @@ from sdf2vec.shapes import KINDS
 from .scenes import SOFT, random_scene, random_shape
 
 NAMESPACE = "{http://www.w3.org/2000/svg}"
-Parameters = dict[str, float | tuple[float, ...]]
+Parameters = dict[str, Any]  # of a shape, by name
 WHITE, BLACK, ORANGE = (1.0, 1.0, 1.0), (0.0, 0.0, 0.0), (1.0, 0.6, 0.0)
 
 

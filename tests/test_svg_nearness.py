@@ -5,6 +5,7 @@ import math
 import random
 import re
 from dataclasses import replace
+from typing import Any
 from xml.etree import ElementTree
 
 import numpy as np
@@ -30,7 +31,7 @@ from sdf2vec.shapes import PolygonOutline
 
 from .scenes import random_shape
 
-Numbers = dict[str, float | tuple[float, ...]]
+Numbers = dict[str, Any]  # of a shape, by name
 NAMESPACE = "{http://www.w3.org/2000/svg}"
 BLURRING = ["resvg", "librsvg", "chromium", "firefox"]
 
