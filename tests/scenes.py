@@ -20,15 +20,18 @@ def random_shape(kind: str, r: random.Random, lowest: float = 0.0, paint: str = 
     first = color()
     x, y = r.uniform(-0.7, 0.7), r.uniform(-0.5, 0.5)
     size = r.uniform(0.05, 0.35)
-    patch = (x, y, size * 0.5, size * 0.5 * r.uniform(0.3, 1.2), r.uniform(-7, 7))
+
+    def patch():
+        return (x, y, size * 0.5, size * 0.5 * r.uniform(0.3, 1.2), r.uniform(-7, 7))
+
     numbers = {
         "circle": lambda: (x, y, size),
         "ellipse": lambda: (x, y, size, size * r.uniform(0.2, 1.2), r.uniform(-7, 7)),
         "box": lambda: (x, y, size, size * r.uniform(0.2, 1.2), r.uniform(-7, 7), r.choice([0.0, 0.02, 0.5])),
         "triangle": lambda: tuple(c + r.uniform(-0.4, 0.4) for c in (x, y, x, y, x, y)),
         "displaced": lambda: (x, y, size, size * 0.2, r.uniform(5, 30), r.uniform(-30, -5)),
-        "gaussian": lambda: patch,
-        "gabor": lambda: (*patch, r.uniform(-40, 40), r.uniform(0, 6)),
+        "gaussian": patch,
+        "gabor": lambda: (*patch(), r.uniform(-40, 40), r.uniform(0, 6)),
     }[kind]()
     own = {"flat": tuple, "linear": lambda: (*color(), r.uniform(-1, 1), r.uniform(-1, 1))}[paint]()
     return Shape(kind, numbers, first, paint, own)

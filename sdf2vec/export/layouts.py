@@ -30,6 +30,7 @@ CELLS_ACROSS = (2, 4, 8, 12, 16, 24, 32, 48)
 MOST_CELLS = 1 << 13
 LIST_BYTES_A_SECOND = 20_000.0  # of constant lists that compilers take
 FRAMES = 30  # frames that weigh as much as one compilation
+WORD = 30  # bits of an integer in a text
 NUMBER = 8.5  # characters of a number in a table, with its separator
 
 

@@ -12,25 +12,26 @@ from ..paints import PAINTS
 from ..scene import Scene
 from ..shapes import KINDS
 from ..units import Parameter
+from .layouts import WORD
 from .packing import (
     CELL_BITS,
     CHOICE_BITS,
     COUNT_BITS,
     PLACE,
-    WORD,
     Layout,
-    Packed,
     by_precision,
     decoded,
+    pack,
 )
 from .records import Form, Variant, drawn_by, joined_by
 
 
 class PackedText:
-    """The text of one packed scene. `motion` is added to distances."""
+    """The text of a scene, packed with room for edges to move by `slack`; `motion` is added to distances."""
 
-    def __init__(self, scene: Scene, packed: Packed, dialect: Dialect, motion: Expr = STILL) -> None:
-        self.packed, self.dialect = packed, dialect
+    def __init__(self, scene: Scene, slack: float, dialect: Dialect, motion: Expr = STILL) -> None:
+        self.packed, self.dialect = pack(scene, slack), dialect
+        packed = self.packed
         self.form = Form(packed.variants, packed.joins, scene.compositing)
         self.layout = Layout(packed.variants, packed.joins)
         opacity, falloff = (self._field(parameter) for parameter in LOOK)

@@ -32,12 +32,12 @@ from ..scene import Joint, Layer, Scene, Shape
 from ..shapes import KINDS
 from ..threads import threads_of_its_own
 from ..units import ANGLE, COLOR_DECIMALS, FREQUENCY, GEOMETRY_DECIMALS, Fractions, Parameter
+from .layouts import WORD
 from .records import Variant, first_records, joins_of, variant_of, variants_of
 from .tiles import Grid, layer_bounds
 
 LIMIT = 0.95  # 8-bit levels: largest error of the picture; drawing adds less than 0.05
 CANVAS = (1920, 1080)  # pixels, for which the error is measured
-WORD = 30  # bits
 SAMPLE = 1 << 21  # shapes × pixels that are looked at where no kernels are worth compiling
 CELLS = 16  # along the longer side of the grid
 CELL_BITS = 4
@@ -456,12 +456,6 @@ class _Stream:
 
 
 AHEAD = 4  # words that a shader may read beyond a shape
-
-
-def joined(numbers: Sequence[int], bits: int, per: int) -> list[int]:
-    """`per` numbers of so many bits in each word, the first in its lowest bits."""
-    groups = (numbers[i : i + per] for i in range(0, len(numbers), per))
-    return [sum(number << (bits * place) for place, number in enumerate(group)) for group in groups]
 
 
 def _cell_boxes(scene: Scene, slack: float) -> tuple[Grid, list[tuple[int, int, int, int]]]:

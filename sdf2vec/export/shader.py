@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import base64
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -11,6 +11,7 @@ import numpy as np
 
 from ..arrays import Float32Array, IntArray
 from ..blend import BREATH, COMPOSITING, FRAMINGS, breath, display, grid_point, surface_point
+from ..deferred import deferred
 from ..errors import Sdf2vecError
 from ..expr import Expr, const, var, vec2, vec4
 from ..layer import STILL, Formula, P, constant_row
@@ -19,7 +20,6 @@ from ..operation import VEC2
 from ..paints import FLAT
 from ..scene import Layer, Scene
 from ..templating import template
-from . import packing
 from .exported import Exported
 from .layouts import (
     EMBEDDED,
@@ -28,6 +28,7 @@ from .layouts import (
     OLD,
     PASTED,
     TEXT_LIMIT,
+    WORD,
     Choice,
     Host,
     best_data_tiles,
@@ -35,10 +36,10 @@ from .layouts import (
     choose,
 )
 from .options import GLSL_VERSIONS, Options
-from .packed_text import PackedText
 from .records import BELOW, COUNT, JOIN, OWN, Form, first_records, form_of, records, slot
 from .tiles import COARSEST, Tiles
 
+packed_text: Callable[..., Any] = deferred("sdf2vec.export.packed_text", "PackedText")  # needs torch
 DATA_WIDTH = 256  # texels in a row of a data texture
 
 
@@ -230,14 +231,20 @@ def _tiled(job: _Job) -> dict[str, Any]:
     tiles = best_tiles(job.scene, job.target.host.bytes_a_second, job.slack)
     entries = first_records(job.scene.layers)[tiles.entries]
     bits = max(1, int(entries.max(initial=0)).bit_length())
-    per = packing.WORD // bits
+    per = WORD // bits
     part = _grid_part(job, tiles) | {
         "starts": _ivec4s(tiles.starts.tolist()),
-        "lists": _ivec4s(packing.joined(entries.tolist(), bits, per)),
+        "lists": _ivec4s(_joined(entries.tolist(), bits, per)),
         "bits": bits,
         "per": per,
     }
     return _table(job) | _loop(job, form_of(job.scene), tiles) | {"tiles": part}
+
+
+def _joined(numbers: Sequence[int], bits: int, per: int) -> list[int]:
+    """`per` numbers of so many bits in each word, the first in its lowest bits."""
+    groups = (numbers[i : i + per] for i in range(0, len(numbers), per))
+    return [sum(number << (bits * place) for place, number in enumerate(group)) for group in groups]
 
 
 def _data(job: _Job) -> dict[str, Any]:
@@ -338,14 +345,10 @@ def _ivec4s(numbers: list[int]) -> list[str]:
 
 
 def _packed(job: _Job) -> dict[str, Any]:
-    packed = packing.pack(job.scene, job.slack)
-    text = PackedText(job.scene, packed, job.dialect, job.motion(var("float(i)")))
+    text = packed_text(job.scene, job.slack, job.dialect, job.motion(var("float(i)")))
     part = text.part() | {"coarsest": literal(COARSEST), "moving": bool(job.slack)}
-    return {
-        "functions": job.functions([*text.roots, grid_point(P, P, P)]),
-        "packed": part,
-        "error": packed.error,
-    }
+    functions = job.functions([*text.roots, grid_point(P, P, P)])
+    return {"functions": functions, "packed": part, "error": text.packed.error}
 
 
 _BODIES = {"readable": _readable, "table": _table, "tiled": _tiled, "packed": _packed, "data": _data}

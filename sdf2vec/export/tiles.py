@@ -7,22 +7,24 @@ Cells at the border go on for ever outwards: the lists hold on a canvas of any s
 
 from __future__ import annotations
 
+from collections import defaultdict
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from functools import cache
+from typing import Any
 
 import numpy as np
-import torch
 
 from ..arrays import BoolArray, Float64Array, IntArray
 from ..blend import COMPOSITING
+from ..deferred import deferred
 from ..expr import var
 from ..graph import components_of
 from ..layer import Formula, P, Structure
-from ..lower.torch import Tensors, compile_torch
-from ..render.fused import uniform_rows
-from ..render.tensors import Group, from_scene
 from ..scene import Scene
+
+from_numpy: Callable[..., Any] = deferred("torch", "from_numpy")
+compile_torch: Callable[..., Callable[..., Any]] = deferred("sdf2vec.lower.torch", "compile_torch")
 
 COARSEST = 0.01  # scene units a pixel: lists hold where the picture's shortest side has 100 pixels or more
 MARGIN = 1e-4  # cells: room for a shader's rounding where two cells meet
@@ -135,40 +137,44 @@ def _overlap(boxes: Float64Array, regions: Float64Array) -> BoolArray:
 def layer_bounds(scene: Scene, slack: float = 0.0) -> Bounds:
     """The bounds of all layers for pixels of at most `COARSEST`."""
     values = np.zeros((len(scene.layers), 7))
-    for group, rows in _groups(scene):
-        measured = _measure(group.structure)(*rows, rows[0].new_tensor(slack))
-        values[group.order.numpy()] = np.stack([v.expand(len(group)).numpy() for v in measured], axis=1)
+    for structure, places, rows in _groups(scene):
+        measured = _measure(structure)(*rows, rows[0].new_tensor(slack))
+        values[places] = np.stack([v.expand(len(places)).numpy() for v in measured], axis=1)
     return Bounds(values[:, :4], values[:, 4], values[:, 5], values[:, 6])
 
 
 def layer_distances(scene: Scene, layers: IntArray, points: Float64Array) -> Float64Array:
     """Distance of layer layers[i] at points[i]; [P], [P, 2] → [P]."""
     distances = np.zeros(len(layers))
-    for group, rows in _groups(scene):
-        place = np.full(len(scene.layers), -1)
-        place[group.order.numpy()] = np.arange(len(group))
-        wanted = np.nonzero(place[layers] >= 0)[0]
-        chosen = torch.from_numpy(place[layers[wanted]])
-        x, y = torch.from_numpy(points[wanted]).T
-        (found,) = _distance(group.structure)(x, y, *(row[chosen] for row in rows))
+    for structure, places, rows in _groups(scene):
+        row_of = np.full(len(scene.layers), -1)
+        row_of[places] = np.arange(len(places))
+        wanted = np.nonzero(row_of[layers] >= 0)[0]
+        chosen = from_numpy(row_of[layers[wanted]])
+        x, y = from_numpy(points[wanted]).T
+        (found,) = _distance(structure)(x, y, *(row[chosen] for row in rows))
         distances[wanted] = found.numpy()
     return distances
 
 
-def _groups(scene: Scene) -> Iterator[tuple[Group, Tensors]]:
-    """Groups of like layers, and their uniforms in the order that `Formula.uniforms` says, each [G]."""
-    for group in from_scene(scene, torch.float64).groups:
-        yield group, uniform_rows(group, COARSEST).unbind(dim=1)
+def _groups(scene: Scene) -> Iterator[tuple[Structure, IntArray, list[Any]]]:
+    """The layers of each structure: their places [G], and tensors [G] of what `Formula.uniforms` says."""
+    members: dict[Structure, list[int]] = defaultdict(list)
+    for index, layer in enumerate(scene.layers):
+        members[layer.structure].append(index)
+    for structure, places in members.items():
+        rows = np.array([[COARSEST, *scene.layers[place].numbers] for place in places])
+        yield structure, np.array(places), [from_numpy(np.ascontiguousarray(row)) for row in rows.T]
 
 
 @cache
-def _measure(structure: Structure) -> Callable[..., Tensors]:
+def _measure(structure: Structure) -> Callable[..., Any]:
     """Box, outer and inner distance and slope of a layer from its uniforms and the slack."""
     formula, slack = Formula.of(structure), var("slack")
     return compile_torch(formula.bounds(slack), [*formula.uniforms, slack])
 
 
 @cache
-def _distance(structure: Structure) -> Callable[..., Tensors]:
+def _distance(structure: Structure) -> Callable[..., Any]:
     formula = Formula.of(structure)
     return compile_torch([formula.distance], [*components_of(P), *formula.uniforms])
