@@ -14,7 +14,7 @@ from sdf2vec.export import packing
 from sdf2vec.export.exported import Exported
 from sdf2vec.export.layouts import FILE, MODULE, OLD, PASTED, TEXT_LIMIT, choose
 from sdf2vec.export.options import Options
-from sdf2vec.export.shader import _joined, shader, short
+from sdf2vec.export.shader import shader, short, words_of
 from sdf2vec.export.tiles import COARSEST, bin_layers, scene_grid
 from sdf2vec.render import reference
 from sdf2vec.render.reference import group_coverage
@@ -257,7 +257,7 @@ def test_lists_are_short_where_shapes_are_small_or_hidden():
 
 def test_joined_numbers_read_back():
     numbers = [5, 0, 1023, 7, 8]
-    words = _joined(numbers, 10, 3)
+    words = words_of(numbers, 10, 3)
     assert [words[k // 3] >> (k % 3 * 10) & 1023 for k in range(5)] == numbers
 
 

@@ -234,14 +234,14 @@ def _tiled(job: _Job) -> dict[str, Any]:
     per = WORD // bits
     part = _grid_part(job, tiles) | {
         "starts": _ivec4s(tiles.starts.tolist()),
-        "lists": _ivec4s(_joined(entries.tolist(), bits, per)),
+        "lists": _ivec4s(words_of(entries.tolist(), bits, per)),
         "bits": bits,
         "per": per,
     }
     return _table(job) | _loop(job, form_of(job.scene), tiles) | {"tiles": part}
 
 
-def _joined(numbers: Sequence[int], bits: int, per: int) -> list[int]:
+def words_of(numbers: Sequence[int], bits: int, per: int) -> list[int]:
     """`per` numbers of so many bits in each word, the first in its lowest bits."""
     groups = (numbers[i : i + per] for i in range(0, len(numbers), per))
     return [sum(number << (bits * place) for place, number in enumerate(group)) for group in groups]
