@@ -134,8 +134,8 @@ def over(below: Expr, color: Expr, opacity: Expr, cover: Expr) -> Expr:
 
 @function("add", below=VEC4, color=VEC3, opacity=FLOAT, cover=FLOAT)
 def additive(below: Expr, color: Expr, opacity: Expr, cover: Expr) -> Expr:
-    """Adds a signed colour to what is below (premultiplied); opacity is what it adds to alpha."""
-    return below + vec4(color, opacity) * cover
+    """Adds a signed colour to what is below (premultiplied); opacity is what either sign of a wave adds to alpha."""
+    return below + vec4(color * cover, opacity * absolute(cover))
 
 
 @dataclass(frozen=True)

@@ -258,3 +258,12 @@ def test_derivatives_of_every_number(family, compositing):
                     found.append(float(loss()))
             flat[index] = before
             assert slope == pytest.approx((found[0] - found[1]) / 2e-6, rel=1e-4, abs=1e-5)
+
+
+def test_a_wave_leaves_an_opaque_ground_opaque():
+    """Under `additive` the troughs of a Gabor patch take light away, not alpha."""
+    wave = Shape("gabor", (0, 0, 0.2, 0.2, 0, 40, 0), (0.3, 0.3, 0.3))
+    image = render(Scene(40, 40, (Layer((wave,)),), (0.5, 0.5, 0.5), "additive"))
+    assert torch.all(image[3] == 1.0)
+    assert image[:3].min() < 0.35
+    assert image[:3].max() > 0.65
