@@ -1,11 +1,10 @@
 """FLIP against NVIDIA's own implementation; the loss against finite differences, at its kinks, and in fits."""
 
-from dataclasses import replace
-
 import flip_evaluator
 import numpy as np
 import pytest
 import torch
+from msgspec.structs import replace
 
 from sdf2vec import flip as module
 from sdf2vec.fit.flip import Flip
