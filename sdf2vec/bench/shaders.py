@@ -23,6 +23,7 @@ from ..export.layouts import TEXT_LIMIT, fits_constants
 from ..export.options import Options
 from ..export.shader import Shader, shader
 from ..files import write_atomically
+from ..render.draw import draw
 from ..roundtrip import SHADERTOY_HEAD, SHADERTOY_TAIL
 from ..scene import Scene
 
@@ -54,7 +55,6 @@ def measure(scene: Scene, target: str, layout: str, engine: str) -> Measured:
     os.environ["MESA_SHADER_CACHE_DISABLE"] = "true"
     made = shader(scene, target, Options(layout=layout))
     compiled, first, frame, pixels = DRAW[engine](made, target)
-    from ..render.draw import draw
 
     expected = draw(scene, SIDE, SIDE).permute(1, 2, 0).numpy()
     return Measured(compiled, first, frame, float(np.abs(pixels - expected).max()) * 255.0)
