@@ -117,18 +117,23 @@ def fill_tile(background, tile):
 
 
 @inlined
+def copy_line(source, target, count):
+    """Copies a tile's line, or the `count` pixels of it that there are; whole ones in a loop of fixed length."""
+    if count >= TILE:
+        for s in range(TILE):
+            target[s] = source[s]
+    else:
+        for s in range(count):
+            target[s] = source[s]
+
+
+@inlined
 def tile_to_image(top, left, tile, image):
     """Writes a tile [C, pixels] to its place in an image [C, H, W], as far as it reaches."""
     height, width = image.shape[1:]
     for c in range(tile.shape[0]):
         for r in range(min(TILE, height - top)):
-            line, row = image[c, top + r, left:], tile[c, r * TILE :]
-            if width - left >= TILE:
-                for s in range(TILE):
-                    line[s] = row[s]
-            else:
-                for s in range(width - left):
-                    line[s] = row[s]
+            copy_line(tile[c, r * TILE :], image[c, top + r, left:], width - left)
 
 
 @inlined
@@ -139,13 +144,7 @@ def image_to_tile(top, left, image, tile):
         tile[:] = ZERO
     for c in range(tile.shape[0]):
         for r in range(min(TILE, height - top)):
-            line, row = image[c, top + r, left:], tile[c, r * TILE :]
-            if width - left >= TILE:
-                for s in range(TILE):
-                    row[s] = line[s]
-            else:
-                for s in range(width - left):
-                    row[s] = line[s]
+            copy_line(image[c, top + r, left:], tile[c, r * TILE :], width - left)
 
 
 @inlined
