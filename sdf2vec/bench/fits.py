@@ -9,6 +9,7 @@ from typing import Any, NamedTuple
 import numpy as np
 import torch
 
+from ..arrays import Float32Array
 from ..fit.loop import fit_picture
 from ..fit.settings import settings_of
 from ..flip import flip
@@ -34,11 +35,15 @@ def measured(picture: Picture, shapes: int, **options: Any) -> tuple[Fitted, Sce
     started, used = time.perf_counter(), _cpu()
     scene = fit_picture(picture, settings)
     seconds, cpu = time.perf_counter() - started, _cpu() - used
-    pixels = premultiply(picture.pixels) if picture.has_alpha else picture.pixels
-    target = torch.from_numpy(np.ascontiguousarray(pixels.transpose(2, 0, 1)))
+    target = torch.from_numpy(np.ascontiguousarray(as_seen(picture).transpose(2, 0, 1)))
     image = draw(scene, picture.width, picture.height)[: len(target)]
     near, alike, seen = (float(metric(image, target)) for metric in (psnr, ssim, flip))
     return Fitted(near, alike, seen, seconds, cpu), scene
+
+
+def as_seen(picture: Picture) -> Float32Array:
+    """Its pixels [H, W, C], premultiplied where there is alpha."""
+    return premultiply(picture.pixels) if picture.has_alpha else picture.pixels
 
 
 def median(fits: list[Fitted]) -> Fitted:

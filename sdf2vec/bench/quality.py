@@ -83,9 +83,20 @@ def table(rows: list[Row], command: str) -> str:
     body = (
         f"| {r.picture} | {r.kind} | {r.paint} | {r.compositing} | {r.shapes} | {r.numbers} "
         f"| {r.psnr:.2f} | {r.ssim:.4f} | {r.flip:.4f} | {r.seconds:.1f} |"
-        for r in rows
+        for r in [*rows, *_means(rows)]
     )
     return "\n".join([*head, *body]) + "\n"
+
+
+def _means(rows: list[Row]) -> Iterator[Row]:
+    """Over the pictures, of each way; none for a single picture."""
+    ways: dict[tuple[str, str, str, int], list[Row]] = {}
+    for r in rows:
+        ways.setdefault((r.kind, r.paint, r.compositing, r.shapes), []).append(r)
+    for way, alike in ways.items():
+        if len(alike) > 1:
+            values = ([r.psnr, r.ssim, r.flip, r.seconds] for r in alike)
+            yield Row("**mean**", *way, alike[0].numbers, *np.mean(list(values), axis=0).tolist())
 
 
 def _rows(options: argparse.Namespace) -> Iterator[Row]:
@@ -109,7 +120,7 @@ def main() -> None:
     parser.add_argument("--seed", type=int, default=0)
     parser.add_argument("-o", "--output", type=Path, required=True)
     options = parser.parse_args()
-    names = " ".join(map(str, options.pictures))
+    names = " ".join(path.name for path in options.pictures)
     command = (
         f"python -m sdf2vec.bench.quality {names} --shapes {options.shapes} --kinds {options.kinds} "
         f"--paints {options.paints} --compositing {options.compositing} --preset {options.preset} "
