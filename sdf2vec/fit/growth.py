@@ -14,7 +14,7 @@ from ..blend import COMPOSITING
 from ..render.tensors import Group, SceneTensors
 from .adam import Adam
 from .initialization import Layers, Places, groups_at, straight
-from .matching_pursuit import find_discs
+from .matching_pursuit import Missing, Painted, find_discs
 
 PROBES = 8  # random images that estimate what a layer does to the picture
 ROOM = 0.8  # size of a new shape, in radii of the disc whose place it takes: its falloff lies outside of that
@@ -79,22 +79,24 @@ def densify(
     generator: torch.Generator,
     weights: torch.Tensor | None = None,
 ) -> list[Group]:
-    """New layers on top of all others, where they take most of what is missing from an image [C, H, W] away.
+    """New layers on top of all others, where they bring an image [C, H, W] nearest to its target.
 
-    `weights` [H, W]: how much an error matters.
+    As many as `count`, fewer where no more would help. `weights` [H, W]: how much an error matters.
     """
     image, target = image.detach().cpu(), target.cpu()
-    residual = target - image if weights is None else (target - image) * weights.cpu()
-    found = find_discs(residual, count)
+    weights = torch.ones(target.shape[1:]) if weights is None else weights.cpu()
+    if layers.signed:
+        found = find_discs(Missing(target - image, weights), count)
+    else:
+        found = find_discs(Painted(image.clone(), target, weights), count)
     height, width = target.shape[1:]
     centers = (found.centers / torch.tensor([width, height]) - 0.5) * torch.tensor(tensors.size)
     sizes = found.radii * ROOM * (tensors.size[0] / width)
-    column, row = found.centers.long().unbind(1)
     if layers.signed:
-        amounts = torch.nn.functional.pad(found.amounts, (0, 4 - found.amounts.shape[1]))
+        amounts = torch.nn.functional.pad(found.colors, (0, 4 - found.colors.shape[1]))
         colors = amounts.clamp(-1.0, 1.0)
     else:
-        colors = straight(image[:, row, column].T + found.amounts)
+        colors = straight(found.colors)
     return groups_at(Places(centers, sizes, colors), layers, generator, first=tensors.layer_count)
 
 

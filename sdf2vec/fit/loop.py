@@ -176,9 +176,12 @@ class Fit:
         count = (self.settings.shapes - tensors.shape_count) // self.settings.union
         if count > 0:
             image = fused.composite(tensors, target.shape[2], target.shape[1], len(target))
-            everything = [torch.arange(len(group)) for group in tensors.groups]
-            fresh = densify(image, target, count, tensors, _layers_of(self.settings), self.generator)
-            exchange(tensors, optimizer, everything, fresh)
+            layers, full = _layers_of(self.settings), tensors.layer_count + count
+            _add(tensors, optimizer, densify(image, target, count, tensors, layers, self.generator))
+            rest = place(target, self.size, layers, full - tensors.layer_count, ANYWHERE, self.generator)
+            for group in rest.groups:
+                group.order += tensors.layer_count
+            _add(tensors, optimizer, rest.groups)
 
     def _announce_compiling(self) -> None:
         if not self.backend.is_compiled(self.tensors, self.pixels.shape[2]):
@@ -310,6 +313,10 @@ class Fit:
             score if len(group.structure) == self.settings.union else torch.full_like(score, math.inf)
             for score, group in zip(scores, self.tensors.groups, strict=True)
         ]
+
+
+def _add(tensors: SceneTensors, optimizer: Adam, fresh: list[Group]) -> None:
+    exchange(tensors, optimizer, [torch.arange(len(group)) for group in tensors.groups], fresh)
 
 
 def _layers_of(settings: Settings) -> Layers:

@@ -1,4 +1,8 @@
-"""Where shapes would help most: matching pursuit with soft discs on what is missing of a picture."""
+"""Where shapes would help most: matching pursuit with soft discs, which are added to an image or painted over it.
+
+What a shape paints over is lost, so that a wide disc of the missing colour may help where colours are added and do harm
+where they hide.
+"""
 
 from __future__ import annotations
 
@@ -17,38 +21,96 @@ SMALLEST_RADIUS, LARGEST_RADIUS = (
 )  # of a disc: pixels; shares of the square root of the picture's area
 WIDTH = 0.6  # standard deviation of the Gaussian that stands for a disc of radius 1
 DISC = 0.7  # amount of a disc in that of the Gaussian which fits it best: 1 / (2 − 2·exp(−u)), u = 1.256
+TINY = 1e-9
 APART = 1.5  # radii around a disc where none is put in the same round
 
 
 class Discs(NamedTuple):
-    """Position in pixels [N, 2], radius in pixels [N], and what each adds [N, C]."""
+    """Position in pixels [N, 2], radius in pixels [N], what each adds or the colour that it paints [N, C]."""
 
     centers: torch.Tensor
     radii: torch.Tensor
-    amounts: torch.Tensor
+    colors: torch.Tensor
 
 
-def find_discs(residual: torch.Tensor, count: int) -> Discs:
-    """The discs that take most of a residual [C, H, W] away, squared; greedy (Mallat and Zhang 1993)."""
-    height, width = residual.shape[1:]
+class Missing(NamedTuple):
+    """What a picture [C, H, W] lacks, where colours are added; each pixel's error times `weights` [H, W] matters."""
+
+    residual: torch.Tensor
+    weights: torch.Tensor
+
+    def responses(self, radii: torch.Tensor) -> tuple[torch.Tensor, torch.Tensor]:
+        """For a disc of every size at every pixel, the best amount [S, C, H, W] and what it gains [S, H, W]."""
+        matters = self.weights.square()
+        fitted = _blurred(self.residual * matters, radii)
+        energy = _blurred(matters[None], radii / math.sqrt(2.0)).clamp_min(TINY)
+        gains = (fitted.square() / energy).sum(1)
+        return fitted / energy, gains
+
+    def apply(self, window: torch.Tensor, color: torch.Tensor) -> None:
+        self.residual.sub_(color[:, None, None] * window)
+
+    def amount(self, color: torch.Tensor) -> torch.Tensor:
+        """Of a disc in that of the Gaussian that stands for it."""
+        return DISC * color
+
+
+class Painted(NamedTuple):
+    """An image and the picture that it should be [C, H, W], where opaque colours are laid over it."""
+
+    image: torch.Tensor
+    target: torch.Tensor
+    weights: torch.Tensor
+
+    def responses(self, radii: torch.Tensor) -> tuple[torch.Tensor, torch.Tensor]:
+        """For a disc of every size at every pixel, the best colour [S, C, H, W] and what it gains [S, H, W].
+
+        With cover h, image i and residual r, colour c leaves r − h·(c − i) of it: a quadratic in c.
+        """
+        matters, narrow = self.weights.square(), radii / math.sqrt(2.0)  # a Gaussian's square is narrower
+        residual = self.target - self.image
+        linear = _blurred(residual * matters, radii) + _blurred(self.image * matters, narrow)
+        energy = _blurred(matters[None], narrow).clamp_min(TINY)
+        colors = (linear / energy).clamp(0.0, 1.0)
+        hidden = (residual * self.image * matters).sum(0, keepdim=True)
+        lost = (self.image.square() * matters).sum(0, keepdim=True)
+        fixed = 2.0 * _blurred(hidden, radii) + _blurred(lost, narrow)
+        gains = (colors * (2.0 * linear - colors * energy)).sum(1) - fixed[:, 0]
+        return colors, gains
+
+    def apply(self, window: torch.Tensor, color: torch.Tensor) -> None:
+        self.image.add_((color[:, None, None] - self.image) * window)
+
+    def amount(self, color: torch.Tensor) -> torch.Tensor:
+        """Of a disc in that of the Gaussian that stands for it."""
+        return color
+
+
+def find_discs(canvas: Missing | Painted, count: int) -> Discs:
+    """The discs that lower the squared error most; greedy (Mallat and Zhang 1993). Fewer where no more would help.
+
+    The canvas is changed.
+    """
+    height, width = canvas.weights.shape
     radii = _radii(height, width)
-    left = residual.clone()
     found: list[tuple[int, int, int, torch.Tensor]] = []
     for rounds_left in chain(range(ROUNDS, 0, -1), repeat(1)):
-        if len(found) == count:
-            break
         now = math.ceil((count - len(found)) / rounds_left)
-        found += islice(_round(left, radii), now)
+        fresh = list(islice(_round(canvas, radii), now))
+        found += fresh
+        if len(found) == count or not fresh:
+            break
     x, y, scale = torch.tensor([disc[:3] for disc in found], dtype=torch.int64).reshape(-1, 3).unbind(1)
-    amounts = [residual.new_zeros(0, len(residual)), *(amount[None] for *_, amount in found)]
-    return Discs(torch.stack([x + 0.5, y + 0.5], dim=1), radii[scale], DISC * torch.cat(amounts))
+    channels = len(canvas[0])
+    colors = [torch.zeros(0, channels), *(canvas.amount(color)[None] for *_, color in found)]
+    return Discs(torch.stack([x + 0.5, y + 0.5], dim=1), radii[scale], torch.cat(colors))
 
 
-def _round(left: torch.Tensor, radii: torch.Tensor) -> Iterator[tuple[int, int, int, torch.Tensor]]:
-    """The best discs, taken from the residual one after the other, until their surroundings fill the picture."""
-    amounts, gains = _responses(left, radii)
-    while not gains.max() < 0:
-        yield _take(left, amounts, gains, radii)
+def _round(canvas: Missing | Painted, radii: torch.Tensor) -> Iterator[tuple[int, int, int, torch.Tensor]]:
+    """The best discs, put on the canvas one after the other, until their surroundings fill it."""
+    colors, gains = canvas.responses(radii)
+    while gains.max() > 0:
+        yield _take(canvas, colors, gains, radii)
 
 
 def _radii(height: int, width: int) -> torch.Tensor:
@@ -61,12 +123,10 @@ def _radii(height: int, width: int) -> torch.Tensor:
     return SMALLEST_RADIUS * SCALE ** torch.arange(steps, dtype=torch.float32)
 
 
-def _responses(left: torch.Tensor, radii: torch.Tensor) -> tuple[torch.Tensor, torch.Tensor]:
-    """For a disc of every size at every pixel, the best amount [S, C, H, W] and what it gains [S, H, W]."""
-    energy = torch.stack([_energy(radius) for radius in radii.tolist()])
-    down, across = (_windows(side, radii) for side in left.shape[1:])
-    fitted = down[:, None] @ left @ across[:, None]  # a Gaussian is a product, so two small matrices blur
-    return fitted / energy[:, None, None, None], fitted.square().sum(1) / energy[:, None, None]
+def _blurred(image: torch.Tensor, radii: torch.Tensor) -> torch.Tensor:
+    """An image [C, H, W] times the Gaussian of every size at every pixel, summed, [S, C, H, W]."""
+    down, across = (_windows(side, radii) for side in image.shape[1:])
+    return down[:, None] @ image @ across[:, None]  # a Gaussian is a product, so two small matrices blur
 
 
 def _windows(side: int, radii: torch.Tensor) -> torch.Tensor:
@@ -75,26 +135,20 @@ def _windows(side: int, radii: torch.Tensor) -> torch.Tensor:
     return torch.stack([_window(places[:, None] - places, radius) for radius in radii.tolist()])
 
 
-def _energy(radius: float) -> torch.Tensor:
-    """The sum of squares of a whole disc."""
-    half = math.ceil(4 * WIDTH * radius)
-    return _window(torch.arange(-half, half + 1), radius).square().sum() ** 2
-
-
 def _window(offsets: torch.Tensor, radius: float) -> torch.Tensor:
     return torch.exp(-0.5 * (offsets / (WIDTH * radius)).square())
 
 
 def _take(
-    left: torch.Tensor, amounts: torch.Tensor, gains: torch.Tensor, radii: torch.Tensor
+    canvas: Missing | Painted, colors: torch.Tensor, gains: torch.Tensor, radii: torch.Tensor
 ) -> tuple[int, int, int, torch.Tensor]:
-    """The best disc (x, y, index of its radius, amount); takes it from the residual and bars its surroundings."""
+    """The best disc (x, y, index of its radius, colour); puts it on the canvas and bars its surroundings."""
     _, height, width = gains.shape
     best = int(gains.argmax())
     scale, y, x = best // (height * width), best // width % height, best % width
-    amount, radius = amounts[scale, :, y, x].clone(), float(radii[scale])
+    color, radius = colors[scale, :, y, x].clone(), float(radii[scale])
     down, across = (_window(torch.arange(side) - at, radius) for side, at in ((height, y), (width, x)))
-    left -= amount[:, None, None] * down[:, None] * across
+    canvas.apply(down[:, None] * across, color)
     reach = math.ceil(APART * radius)
     gains[:, max(0, y - reach) : y + reach + 1, max(0, x - reach) : x + reach + 1] = -1.0
-    return x, y, scale, amount
+    return x, y, scale, color
