@@ -26,10 +26,11 @@ from .constraints import enforce_min_thickness, project, too_small
 from .growth import densify, exchange, importance, prune, relocate
 from .initialization import Layers, background_of, empty_groups, place
 from .joining import RESOLUTION as JOIN_RESOLUTION
-from .joining import Search, View, join
+from .joining import Search, join
 from .losses import Objective, objective
 from .presets import CROWDING, MANY, Phase, Start
 from .settings import Settings, preset_of
+from .surroundings import View
 from .weights import weights_for
 
 THICKEN_EVERY = 10  # steps
