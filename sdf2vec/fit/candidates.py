@@ -30,8 +30,8 @@ from .surroundings import Surroundings
 
 ellipses_of: Callable[..., Any] = deferred("sdf2vec.fit.regions", "ellipses")  # scikit-image
 
-KEPT = 4  # starts of a kind in an opening that are trained
-BLURS, STEPS = (4.0, 2.0, 1.0), 4  # sizes of a pixel in pixels, one after the other; steps with each
+KEPT = 3  # starts of a kind in an opening that are trained
+BLURS, STEPS = (3.0, 1.0), 4  # sizes of a pixel in pixels, one after the other; steps with each
 START_SMOOTHNESS = 0.003  # scene units
 EAGER = 0.25  # how much an error matters where a first shape is not wanted: what is too much can be cut out
 LONGER = 1.2  # than wide: most kinds of shape at their start

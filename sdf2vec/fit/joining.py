@@ -27,10 +27,11 @@ from .initialization import Layers, straight
 from .levenberg import Numbers, descend
 from .surroundings import Surroundings, View, points_of, some
 
-RESOLUTION = 48  # pixels squared at which candidates are tried
+RESOLUTION = 40  # pixels squared at which candidates are tried
 SCREENING, TRAINING = 4, 10  # steps of every finalist; of the best of them after that
-FINALISTS, TRAINED, BEAM = 8, 3, 2  # layers that are screened; trained; that go on to have more joined
-ALIKE = 2  # finalists of other kinds of shape in the same place
+FINALISTS, TRAINED, BEAM = 8, 4, 3  # layers that are screened; trained; that go on to have more joined
+KINDS_EACH = 2  # finalists of other kinds of shape in the same place
+ALIKE = 0.1  # squared difference of two layers that look the same, in shares of the error
 REFINING = 20  # steps at the end
 MOST_JOINED = 24  # shapes in one layer
 LONGEST_STEP = 20.0  # rates
@@ -126,12 +127,17 @@ class Worth:
             found.setdefault((tried.layer.structure, is_sharp(tried.layer)), tried)
         return list(found.values())
 
-    def beam(self, all_tried: Iterable[Tried]) -> list[Tried]:
-        """Those that go on, the best first: a soft layer is no rival of sharp ones."""
-        best = self.best(all_tried)
-        sharp = [tried for tried in best if is_sharp(tried.layer)][:BEAM]
-        soft = [tried for tried in best if not is_sharp(tried.layer)][:1]
-        return sorted([*sharp, *soft], key=self.of)
+
+def distinct(ranked: Iterable[Tried], around: Surroundings, most: int) -> list[Tried]:
+    """The first few that don't look like one before them."""
+    found: list[tuple[Tried, torch.Tensor]] = []
+    for tried in ranked:
+        wrong = around.problem(tried.layer.structure).wrong(tried.layer.rows()[..., None])
+        if all(float((wrong - other).square().mean()) > ALIKE * tried.error for _, other in found):
+            found.append((tried, wrong))
+        if len(found) == most:
+            break
+    return [tried for tried, _ in found]
 
 
 def is_sharp(layer: Group) -> bool:
@@ -159,7 +165,10 @@ class Search:
         seen = list(beam)
         while tries < most and beam[0].error > LEAST_ERROR and len(beam[0].layer.structure) <= MOST_JOINED:
             tries += 1
-            chosen = worth.beam([*beam, *self._grown(beam, around, worth)])
+            ranked = worth.best([*beam, *self._grown(beam, around, worth)])
+            sharp = distinct((tried for tried in ranked if is_sharp(tried.layer)), around, BEAM)
+            soft = [tried for tried in ranked if not is_sharp(tried.layer)][:1]  # no rival of the sharp ones
+            chosen = sorted([*sharp, *soft], key=worth.of)
             gain, beam = worth.of(beam[0]) - worth.of(chosen[0]), chosen
             seen += beam
             if gain < LEAST_GAIN:
@@ -201,10 +210,15 @@ class Search:
         """The most promising changes of some layers, trained: a shape joined, exchanged, or left out."""
         places = [opening for tried in beam for opening in openings(tried.layer, around)]
         proposed = self._proposer(around).candidates(places, around)
-        chosen = worth.best(tried for found in proposed for tried in worth.best(found)[:ALIKE])[:FINALISTS]
+        chosen = worth.best(tried for found in proposed for tried in worth.best(found)[:KINDS_EACH])[
+            :FINALISTS
+        ]
         fewer = (Tried(less, around.error(less)) for tried in beam for less in reductions(tried.layer))
         screened = [self._searched(t, around, SCREENING) for t in (*chosen, *worth.best(fewer)[:1])]
-        return [self._searched(tried, around, TRAINING) for tried in worth.best(screened)[:TRAINED]]
+        return [
+            self._searched(tried, around, TRAINING)
+            for tried in distinct(worth.best(screened), around, TRAINED)
+        ]
 
     def _proposer(self, around: Surroundings) -> Proposer:
         kinds = tuple(kind for kind in self.layers.kinds if KINDS[kind].patch is None)

@@ -10,9 +10,9 @@ import numpy as np
 from skimage import measure
 
 LEAST = 0.2  # of the greatest gain: what belongs to a region
-MOST_REGIONS, MOST_PAIRS = 5, 4  # of which pairs are made
+MOST_REGIONS, MOST_PAIRS = 5, 4  # regions; of which pairs are made
 SMALLEST = 0.02  # share of all gain that a region has at least
-THINNEST = 1.0  # pixels: of a region's ellipse the shorter diameter
+THINNEST = 0.5  # pixels: half an ellipse's shorter axis
 
 Ellipse = tuple[
     float, float, float, float, float
@@ -20,7 +20,7 @@ Ellipse = tuple[
 
 
 def ellipses(gain: np.ndarray) -> list[Ellipse]:
-    """Of the regions of a gain [H, W] that have most of it: all together, each, and pairs; with the same moments."""
+    """Of the regions of a gain [H, W] that have most of it: all together, each, and pairs; no longer than they are."""
     return [_ellipse(region) for region in _regions(gain)]
 
 
@@ -31,10 +31,11 @@ def _regions(gain: np.ndarray) -> Iterator[np.ndarray]:
         return
     labels = measure.label(gain > LEAST * most)
     amounts = np.bincount(labels.ravel(), weights=gain.ravel())[1:]
-    order = [
-        index for index in np.argsort(-amounts, kind="stable") if amounts[index] > SMALLEST * amounts.sum()
+    found = [
+        labels == index + 1
+        for index in np.argsort(-amounts, kind="stable")[:MOST_REGIONS]
+        if amounts[index] > SMALLEST * amounts.sum()
     ]
-    found = [labels == index + 1 for index in order[:MOST_REGIONS]]
     if len(found) > 2:
         yield labels > 0
     yield from found
@@ -42,7 +43,11 @@ def _regions(gain: np.ndarray) -> Iterator[np.ndarray]:
 
 
 def _ellipse(region: np.ndarray) -> Ellipse:
-    (found,) = measure.regionprops(region.astype(np.uint8))
-    y, x = found.centroid
-    long, short = max(found.axis_major_length, THINNEST), max(found.axis_minor_length, THINNEST)
-    return x + 0.5, y + 0.5, long / 2, short / 2, math.pi / 2 - found.orientation
+    """That with a region's moments, cut down to the region's extent: between two parts of it there may be anything."""
+    points = np.argwhere(region)[:, ::-1] + 0.5  # [M, 2] x, y
+    middle = points.mean(axis=0)
+    away = points - middle
+    spread, axes = np.linalg.eigh(away.T @ away / len(points))
+    farthest = np.abs(away @ axes).max(axis=0) + 0.5
+    short, long = np.maximum(np.minimum(2.0 * np.sqrt(np.maximum(spread, 0.0)), farthest), THINNEST).tolist()
+    return float(middle[0]), float(middle[1]), long, short, math.atan2(axes[1, 1], axes[0, 1])
