@@ -30,7 +30,7 @@ from .surroundings import Surroundings
 
 ellipses_of: Callable[..., Any] = deferred("sdf2vec.fit.regions", "ellipses")  # scikit-image
 
-KEPT = 3  # starts of a kind in an opening that are trained
+KEPT = 6  # starts of a kind in an opening that are trained
 BLURS, STEPS = (3.0, 1.0), 4  # sizes of a pixel in pixels, one after the other; steps with each
 START_SMOOTHNESS = 0.003  # scene units
 EAGER = 0.25  # how much an error matters where a first shape is not wanted: what is too much can be cut out
@@ -231,7 +231,7 @@ class Proposer:
         best = []
         for mask, placed in zip(masks, starts, strict=True):
             fresh = _rows(structure, placed)
-            errors = _misses(structure, [mask] * len(fresh), around, 1.0).errors(fresh)
+            errors = _misses(structure, [mask] * len(fresh), around, BLURS[0]).errors(fresh)
             best.append(fresh[errors.argsort(stable=True)[:KEPT]])
         counts = [len(rows) for rows in best]
         spread = [mask for mask, count in zip(masks, counts, strict=True) for _ in range(count)]

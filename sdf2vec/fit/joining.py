@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 import operator
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 
@@ -27,39 +27,46 @@ from .initialization import Layers, straight
 from .levenberg import Numbers, descend
 from .surroundings import Surroundings, View, points_of, some
 
-RESOLUTION = 40  # pixels squared at which candidates are tried
+RESOLUTIONS = 40, 80  # pixels squared at which candidates are tried; at which the best are refined first
 SCREENING, TRAINING = 4, 10  # steps of every finalist; of the best of them after that
-FINALISTS, TRAINED, BEAM = 8, 4, 3  # layers that are screened; trained; that go on to have more joined
+FINALISTS, TRAINED, BEAM = (
+    4,
+    4,
+    3,
+)  # changes of a layer that are screened; that are trained; that are built on
 KINDS_EACH = 2  # finalists of other kinds of shape in the same place
 ALIKE = 0.1  # squared difference of two layers that look the same, in shares of the error
-REFINING = 20  # steps at the end
+REFINED, REFINING = 2, 15  # layers that are refined at the end; steps at each resolution
 MOST_JOINED = 24  # shapes in one layer
 LONGEST_STEP = 20.0  # rates
 PRICE = 0.02  # of a number: the part of a layer's share of the error that it must take away
 FIRST_PRICE = 0.004  # while others may follow
-LEAST_GAIN = 0.01  # of the worth of the best layer: with less the search ends
+LEAST_GAIN = 0.03  # of the worth of the best layer: with less the search ends
 LEAST_ERROR = 5e-5  # mean square: below it nothing is missing
 
 Tick = Callable[[float], None]  # told of the error after every step; raises to stop
 
 
 @torch.no_grad()
-def join(scene: SceneTensors, coarse: View, fine: View, search: Search, most: int) -> Iterator[SceneTensors]:
+def join(scene: SceneTensors, views: Sequence[View], search: Search, most: int) -> Iterator[SceneTensors]:
     """The scene after each of its layers has had shapes joined to it, the worst first; tried `most` times in all.
 
-    Tried at the resolution of one picture, refined at that of the other, where it never becomes worse.
+    Tried at the resolution of the first picture, refined at those of the others; never worse at the last.
     """
-    scene, left = _grounded(_detached(scene), fine), list(range(scene.layer_count))
+    coarse, *finer = views
+    scene, left = _grounded(_detached(scene), finer[-1]), list(range(scene.layer_count))
     while left and most > 0:
         order = max(left, key=_faults(scene, coarse).__getitem__)
         left.remove(order)
         (layer,) = some(scene, partial(operator.eq, order)).groups
         found, tries = search.joined(layer, Surroundings.of(scene, order, coarse), most)
-        around = Surroundings.of(scene, order, fine)
-        refined = search.refined(found.layer, around)
-        if refined.error < around.error(layer):
-            changed = _replaced(scene, replace(refined.layer, order=torch.tensor([order])))
-            scene = _grounded(changed, fine)
+        for view in finer:
+            around = Surroundings.of(scene, order, view)
+            found = [search.refined(tried.layer, around) for tried in found]
+        best = min(found, key=operator.attrgetter("error"))
+        if best.error < around.error(layer):
+            changed = _replaced(scene, replace(best.layer, order=torch.tensor([order])))
+            scene = _grounded(changed, finer[-1])
         most -= tries
         yield _detached(scene)
 
@@ -155,8 +162,8 @@ class Search:
     tick: Tick
     pixel: float  # scene units: the least length
 
-    def joined(self, layer: Group, around: Surroundings, most: int) -> tuple[Tried, int]:
-        """A layer, begun anew where that is better, with shapes joined to it while that helps.
+    def joined(self, layer: Group, around: Surroundings, most: int) -> tuple[list[Tried], int]:
+        """The best few with shapes joined, to a layer or to one begun anew, while that helps.
 
         Tried `most` times; also how often it was tried.
         """
@@ -173,7 +180,8 @@ class Search:
             seen += beam
             if gain < LEAST_GAIN:
                 break
-        return min(seen, key=replace(worth, price=PRICE).of), max(tries, 1)
+        ranked = replace(worth, price=PRICE).best(seen)
+        return ranked[:REFINED], max(tries, 1)
 
     def refined(self, layer: Group, around: Surroundings) -> Tried:
         """A layer after some more steps down the squared error."""
@@ -197,28 +205,29 @@ class Search:
         )
 
     def _started(self, layer: Group, around: Surroundings, worth: Worth) -> list[Tried]:
-        """The layer, and two of one shape that are begun anew: the nearest, and one from which to cut."""
+        """The layer, and some of one shape that are begun anew: the nearest, and one from which to cut."""
         is_patch = KINDS[layer.structure[0].kind].patch is not None
         old = [] if is_patch else [self._searched(Tried(layer, 0.0), around, TRAINING)]
         places = alone(layer, self._color(around), around)
         near, wide = (worth.best(found) for found in self._proposer(around).candidates(places, around))
-        anew = [self._searched(tried, around, TRAINING) for tried in near[:BEAM]]
+        anew = [self._searched(tried, around, TRAINING) for tried in near]
         whole = [Tried(tried.layer, around.error(tried.layer)) for tried in wide[:1]]
-        return sorted([*old, *worth.best(anew)[:1], *whole], key=worth.of)
+        return sorted([*old, *distinct(worth.best(anew), around, BEAM), *whole], key=worth.of)
 
     def _grown(self, beam: list[Tried], around: Surroundings, worth: Worth) -> list[Tried]:
         """The most promising changes of some layers, trained: a shape joined, exchanged, or left out."""
-        places = [opening for tried in beam for opening in openings(tried.layer, around)]
-        proposed = self._proposer(around).candidates(places, around)
-        chosen = worth.best(tried for found in proposed for tried in worth.best(found)[:KINDS_EACH])[
-            :FINALISTS
-        ]
-        fewer = (Tried(less, around.error(less)) for tried in beam for less in reductions(tried.layer))
-        screened = [self._searched(t, around, SCREENING) for t in (*chosen, *worth.best(fewer)[:1])]
-        return [
-            self._searched(tried, around, TRAINING)
-            for tried in distinct(worth.best(screened), around, TRAINED)
-        ]
+        proposed = (tried for old in beam for tried in self._proposed(old, around, worth))
+        screened = [self._searched(tried, around, SCREENING) for tried in proposed]
+        best = distinct(worth.best(screened), around, TRAINED)
+        return [self._searched(tried, around, TRAINING) for tried in best]
+
+    def _proposed(self, tried: Tried, around: Surroundings, worth: Worth) -> list[Tried]:
+        """The most promising changes of a layer, and the part that matters least left out."""
+        places = list(openings(tried.layer, around))
+        found = self._proposer(around).candidates(places, around)
+        kinds = (kind for own in found for kind in worth.best(own)[:KINDS_EACH])
+        fewer = (Tried(less, around.error(less)) for less in reductions(tried.layer))
+        return [*worth.best(kinds)[:FINALISTS], *worth.best(fewer)[:1]]
 
     def _proposer(self, around: Surroundings) -> Proposer:
         kinds = tuple(kind for kind in self.layers.kinds if KINDS[kind].patch is None)

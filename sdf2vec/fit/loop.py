@@ -25,7 +25,7 @@ from .backends import Backend, choose
 from .constraints import enforce_min_thickness, project, too_small
 from .growth import densify, exchange, importance, prune, relocate
 from .initialization import Layers, background_of, empty_groups, place
-from .joining import RESOLUTION as JOIN_RESOLUTION
+from .joining import RESOLUTIONS as JOIN_RESOLUTIONS
 from .joining import Search, join
 from .losses import Objective, objective
 from .presets import CROWDING, MANY, Phase, Start
@@ -257,17 +257,17 @@ class Fit:
 
     def _join(self, fine: Stage) -> None:
         """Joins shapes to layers by trial, on the CPU."""
-        coarse = self._stage(Phase("joining", JOIN_STEPS * self.settings.cuts, JOIN_RESOLUTION))
-        last = self.done + coarse.phase.steps
+        phases = [Phase("joining", JOIN_STEPS * self.settings.cuts, size) for size in JOIN_RESOLUTIONS]
+        views = [*(self._stage(phase).view for phase in phases), fine.view]
+        last = self.done + phases[0].steps
 
         def tick(loss: float) -> None:
             self.done = min(self.done + 1, last)
-            self._report(coarse.phase, loss)
+            self._report(phases[0], loss)
 
         search = Search(_layers_of(self.settings), self.preset.falloff, self.generator, tick, self.pixel)
         try:
-            scenes = join(on_device(self.tensors, "cpu"), coarse.view, fine.view, search, self.settings.cuts)
-            for scene in scenes:
+            for scene in join(on_device(self.tensors, "cpu"), views, search, self.settings.cuts):
                 self.tensors = on_device(scene, self.backend.device)
         finally:  # also when stopped
             self.optimizer = self._adam()
