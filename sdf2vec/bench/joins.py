@@ -57,7 +57,7 @@ def structure(layer: Layer) -> str:
 def row(name: str, found: list[tuple[Fitted, Scene]]) -> str:
     """One picture's row of the table."""
     near = np.array([fitted.psnr for fitted, _ in found])
-    seconds = float(np.median([fitted.seconds for fitted, _ in found]))
+    seconds = float(np.median([fitted.cpu for fitted, _ in found]))
     ((common, times),) = Counter(structure(scene.layers[0]) for _, scene in found).most_common(1)
     shapes = float(np.median([scene.shape_count for _, scene in found]))
     return (
@@ -68,7 +68,7 @@ def row(name: str, found: list[tuple[Fitted, Scene]]) -> str:
 
 def table(found: dict[str, list[tuple[Fitted, Scene]]]) -> Iterator[str]:
     """All rows."""
-    yield f"| picture | structure most often found | shapes | PSNR dB | worst | ≥ {ENOUGH:g} dB | seconds |"
+    yield f"| picture | structure most often found | shapes | PSNR dB | worst | ≥ {ENOUGH:g} dB | CPU seconds |"
     yield "|---|---|---:|---:|---:|---:|---:|"
     for name, fits in found.items():
         yield row(name, fits)
@@ -94,7 +94,7 @@ def page(seeds: int, output: Path) -> str:
                 f"Drawn by resvg at {SIDE} × {SIDE} pixels, white on black; fitted from one shape by "
                 f'`fit(picture, 1, kind="mixed", preset="fast", cuts={CUTS})`, {seeds} seeds each. `-` is subtraction, '
                 "`&` intersection, `|` union. PSNR is the median over the seeds; resvg's edges are box-filtered, ours "
-                "logistic: the exact ring has about 43 dB. Seconds are the median.",
+                "logistic: the exact ring has about 43 dB. Seconds are the median of user and system time; kernels may be compiled in the first.",
                 "\n".join(table(found)),
                 f"![The pictures above, the renders of seed 0 below]({shown.name})",
             )

@@ -39,10 +39,11 @@ ALIKE = 0.1  # squared difference of two layers that look the same, in shares of
 REFINED, REFINING = 2, 15  # layers that are refined at the end; steps at each resolution
 MOST_JOINED = 24  # shapes in one layer
 LONGEST_STEP = 20.0  # rates
-PRICE = 0.02  # of a number: the part of a layer's share of the error that it must take away
+PRICE = 0.03  # of a number: the part of a layer's share of the error that it must take away
 FIRST_PRICE = 0.004  # while others may follow
 LEAST_GAIN = 0.03  # of the worth of the best layer: with less the search ends
-LEAST_ERROR = 5e-5  # mean square: below it nothing is missing
+LEAST_ERROR = 1e-9  # mean square: of a picture that needs no layer
+LEAST_SHARE = 5e-4  # of what is missing without the layer, squared: below it nothing is missing
 
 Tick = Callable[[float], None]  # told of the error after every step; raises to stop
 
@@ -120,11 +121,12 @@ class Worth:
     """How good a layer is: its error's logarithm, and a price for each of its numbers; the less the better."""
 
     layer_count: int  # each has about an equal share of the error
-    price: float
+    least: float  # mean square: below it nothing is missing
+    price: float = FIRST_PRICE
 
     def of(self, tried: Tried) -> float:
         """Of those where nothing is missing, the one of fewer numbers is better."""
-        error = math.log(max(tried.error, LEAST_ERROR))
+        error = math.log(max(tried.error, self.least))
         return error * self.layer_count + self.price * row_width(tried.layer.structure)
 
     def best(self, all_tried: Iterable[Tried]) -> list[Tried]:
@@ -134,17 +136,18 @@ class Worth:
             found.setdefault((tried.layer.structure, is_sharp(tried.layer)), tried)
         return list(found.values())
 
-
-def distinct(ranked: Iterable[Tried], around: Surroundings, most: int) -> list[Tried]:
-    """The first few that don't look like one before them."""
-    found: list[tuple[Tried, torch.Tensor]] = []
-    for tried in ranked:
-        wrong = around.problem(tried.layer.structure).wrong(tried.layer.rows()[..., None])
-        if all(float((wrong - other).square().mean()) > ALIKE * tried.error for _, other in found):
-            found.append((tried, wrong))
-        if len(found) == most:
-            break
-    return [tried for tried, _ in found]
+    def distinct(self, all_tried: Iterable[Tried], around: Surroundings, most: int) -> list[Tried]:
+        """The best few that don't look alike; of those that do, the one of fewest numbers."""
+        found: list[tuple[Tried, torch.Tensor]] = []
+        for tried in self.best(all_tried):
+            wrong = around.problem(tried.layer.structure).wrong(tried.layer.rows()[..., None])
+            near = ALIKE * max(tried.error, self.least)
+            like = [i for i, (_, other) in enumerate(found) if (wrong - other).square().mean() <= near]
+            if not like:
+                found.append((tried, wrong))
+            elif row_width(tried.layer.structure) < row_width(found[like[0]][0].layer.structure):
+                found[like[0]] = tried, wrong
+        return [tried for tried, _ in found[:most]]
 
 
 def is_sharp(layer: Group) -> bool:
@@ -167,13 +170,14 @@ class Search:
 
         Tried `most` times; also how often it was tried.
         """
-        worth = Worth(around.scene.layer_count, FIRST_PRICE)
+        bare = float(around.residual().square().mean())
+        worth = Worth(around.scene.layer_count, max(LEAST_SHARE * bare, LEAST_ERROR))
         beam, tries = self._started(layer, around, worth), 0
         seen = list(beam)
-        while tries < most and beam[0].error > LEAST_ERROR and len(beam[0].layer.structure) <= MOST_JOINED:
+        while tries < most and beam[0].error > worth.least and len(beam[0].layer.structure) <= MOST_JOINED:
             tries += 1
             ranked = worth.best([*beam, *self._grown(beam, around, worth)])
-            sharp = distinct((tried for tried in ranked if is_sharp(tried.layer)), around, BEAM)
+            sharp = worth.distinct((tried for tried in ranked if is_sharp(tried.layer)), around, BEAM)
             soft = [tried for tried in ranked if not is_sharp(tried.layer)][:1]  # no rival of the sharp ones
             chosen = sorted([*sharp, *soft], key=worth.of)
             gain, beam = worth.of(beam[0]) - worth.of(chosen[0]), chosen
@@ -212,13 +216,13 @@ class Search:
         near, wide = (worth.best(found) for found in self._proposer(around).candidates(places, around))
         anew = [self._searched(tried, around, TRAINING) for tried in near]
         whole = [Tried(tried.layer, around.error(tried.layer)) for tried in wide[:1]]
-        return sorted([*old, *distinct(worth.best(anew), around, BEAM), *whole], key=worth.of)
+        return sorted([*old, *worth.distinct(anew, around, BEAM), *whole], key=worth.of)
 
     def _grown(self, beam: list[Tried], around: Surroundings, worth: Worth) -> list[Tried]:
         """The most promising changes of some layers, trained: a shape joined, exchanged, or left out."""
         proposed = (tried for old in beam for tried in self._proposed(old, around, worth))
         screened = [self._searched(tried, around, SCREENING) for tried in proposed]
-        best = distinct(worth.best(screened), around, TRAINED)
+        best = worth.distinct(screened, around, TRAINED)
         return [self._searched(tried, around, TRAINING) for tried in best]
 
     def _proposed(self, tried: Tried, around: Surroundings, worth: Worth) -> list[Tried]:
