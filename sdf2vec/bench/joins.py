@@ -94,7 +94,7 @@ def page(seeds: int, output: Path) -> str:
                 f"Drawn by resvg at {SIDE} × {SIDE} pixels, white on black; fitted from one shape by "
                 f'`fit(picture, 1, kind="mixed", preset="fast", cuts={CUTS})`, {seeds} seeds each. `-` is subtraction, '
                 "`&` intersection, `|` union. PSNR is the median over the seeds; resvg's edges are box-filtered, ours "
-                "logistic: the exact ring has about 43 dB. Seconds are the median of user and system time; kernels may be compiled in the first.",
+                "logistic: the exact ring has about 43 dB. Seconds are the median of user and system time.",
                 "\n".join(table(found)),
                 f"![The pictures above, the renders of seed 0 below]({shown.name})",
             )

@@ -36,7 +36,7 @@ FINALISTS, TRAINED, BEAM = (
 )  # changes of a layer that are screened; that are trained; that are built on
 KINDS_EACH = 2  # finalists of other kinds of shape in the same place
 ALIKE = 0.1  # squared difference of two layers that look the same, in shares of the error
-REFINED, REFINING = 2, 15  # layers that are refined at the end; steps at each resolution
+REFINED, REFINING = 2, 20  # layers that are refined at the end; steps at each resolution
 MOST_JOINED = 24  # shapes in one layer
 LONGEST_STEP = 20.0  # rates
 PRICE = 0.03  # of a number: the part of a layer's share of the error that it must take away
@@ -64,7 +64,7 @@ def join(scene: SceneTensors, views: Sequence[View], search: Search, most: int) 
         for view in finer:
             around = Surroundings.of(scene, order, view)
             found = [search.refined(tried.layer, around) for tried in found]
-        best = min(found, key=operator.attrgetter("error"))
+        best = min(found, key=Worth.among(around, PRICE).of)
         if best.error < around.error(layer):
             changed = _replaced(scene, replace(best.layer, order=torch.tensor([order])))
             scene = _grounded(changed, finer[-1])
@@ -122,7 +122,13 @@ class Worth:
 
     layer_count: int  # each has about an equal share of the error
     least: float  # mean square: below it nothing is missing
-    price: float = FIRST_PRICE
+    price: float
+
+    @classmethod
+    def among(cls, around: Surroundings, price: float) -> Worth:
+        """For a layer in its surroundings."""
+        bare = float(around.residual().square().mean())
+        return cls(around.scene.layer_count, max(LEAST_SHARE * bare, LEAST_ERROR), price)
 
     def of(self, tried: Tried) -> float:
         """Of those where nothing is missing, the one of fewer numbers is better."""
@@ -170,8 +176,7 @@ class Search:
 
         Tried `most` times; also how often it was tried.
         """
-        bare = float(around.residual().square().mean())
-        worth = Worth(around.scene.layer_count, max(LEAST_SHARE * bare, LEAST_ERROR))
+        worth = Worth.among(around, FIRST_PRICE)
         beam, tries = self._started(layer, around, worth), 0
         seen = list(beam)
         while tries < most and beam[0].error > worth.least and len(beam[0].layer.structure) <= MOST_JOINED:
