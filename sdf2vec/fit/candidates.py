@@ -107,9 +107,8 @@ def openings(layer: Group, around: Surroundings) -> Iterator[Opening]:
     parts, base = layer.structure, layer.of(BASE.name, 0)
     for join, kind_of_join in JOINS.items():
         for index in range(1, len(parts) + 1):
-            if (
-                index == len(parts) or parts[index].adds != kind_of_join.adds
-            ):  # else the next place is the same
+            next_is_alike = index < len(parts) and parts[index].adds == kind_of_join.adds
+            if not next_is_alike:  # else the next place is the same
                 yield _opening(layer, index, join, base, around)
     for index, part in enumerate(parts):
         color = layer.of(BASE.name, index) if part.adds else base
@@ -137,11 +136,11 @@ def without(layer: Group, index: int) -> Group:
     return Group((*parts[:index], *parts[index + 1 :]), layer.order, values)
 
 
-def alone(layer: Group, color: torch.Tensor, around: Surroundings) -> list[Opening]:
+def alone(layer: Group, color: torch.Tensor, falloff: float, around: Surroundings) -> list[Opening]:
     """Where a layer begins anew in a colour [1, 3]: so that no more is covered than wanted, or all that is."""
     looks = {slot: tensor for slot, tensor in layer.values.items() if slot.part is None}
     looks |= {slot: torch.ones(1, 1) for slot in looks if slot.parameter.unit is OPACITY}
-    looks |= {slot: torch.zeros(1, 1) for slot in looks if slot.parameter.unit is FALLOFF}
+    looks |= {slot: torch.full((1, 1), falloff) for slot in looks if slot.parameter.unit is FALLOFF}
     near = _opening(Group((), layer.order, looks), 0, "", color, around)
     return [near, Opening(near.layer, 0, "", color, near.mask.eager())]
 

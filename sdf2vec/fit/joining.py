@@ -63,8 +63,8 @@ def join(scene: SceneTensors, views: Sequence[View], search: Search, most: int) 
         found, tries = search.joined(layer, Surroundings.of(scene, order, coarse), most)
         for view in finer:
             around = Surroundings.of(scene, order, view)
-            found = [search.refined(tried.layer, around) for tried in found]
-        best = min(found, key=Worth.among(around, PRICE).of)
+            refined = [search.refined(tried.layer, around) for tried in found]
+            found = [best] = [min(refined, key=search.worth(around, PRICE).of)]
         if best.error < around.error(layer):
             changed = _replaced(scene, replace(best.layer, order=torch.tensor([order])))
             scene = _grounded(changed, finer[-1])
@@ -123,12 +123,11 @@ class Worth:
     layer_count: int  # each has about an equal share of the error
     least: float  # mean square: below it nothing is missing
     price: float
+    sharpest: float  # scene units: the least falloff
 
-    @classmethod
-    def among(cls, around: Surroundings, price: float) -> Worth:
-        """For a layer in its surroundings."""
-        bare = float(around.residual().square().mean())
-        return cls(around.scene.layer_count, max(LEAST_SHARE * bare, LEAST_ERROR), price)
+    def is_sharp(self, layer: Group) -> bool:
+        """Whether its edge has no width of its own."""
+        return float(layer.falloff.max()) <= self.sharpest
 
     def of(self, tried: Tried) -> float:
         """Of those where nothing is missing, the one of fewer numbers is better."""
@@ -139,8 +138,15 @@ class Worth:
         """The best of each structure, sharp and soft, the best first."""
         found: dict[tuple[Structure, bool], Tried] = {}
         for tried in sorted(all_tried, key=self.of):
-            found.setdefault((tried.layer.structure, is_sharp(tried.layer)), tried)
+            found.setdefault((tried.layer.structure, self.is_sharp(tried.layer)), tried)
         return list(found.values())
+
+    def beam(self, all_tried: Iterable[Tried], around: Surroundings) -> list[Tried]:
+        """Those that are built on, the best first; a soft layer is no rival of sharp ones."""
+        best = self.best(all_tried)
+        sharp = self.distinct((tried for tried in best if self.is_sharp(tried.layer)), around, BEAM)
+        soft = [tried for tried in best if not self.is_sharp(tried.layer)][:1]
+        return sorted([*sharp, *soft], key=self.of)
 
     def distinct(self, all_tried: Iterable[Tried], around: Surroundings, most: int) -> list[Tried]:
         """The best few that don't look alike; of those that do, the one of fewest numbers."""
@@ -154,11 +160,6 @@ class Worth:
             elif row_width(tried.layer.structure) < row_width(found[like[0]][0].layer.structure):
                 found[like[0]] = tried, wrong
         return [tried for tried, _ in found[:most]]
-
-
-def is_sharp(layer: Group) -> bool:
-    """Whether its edge has no width of its own."""
-    return float(layer.falloff.max()) == 0.0
 
 
 @dataclass(frozen=True)
@@ -176,21 +177,24 @@ class Search:
 
         Tried `most` times; also how often it was tried.
         """
-        worth = Worth.among(around, FIRST_PRICE)
+        worth = self.worth(around, FIRST_PRICE)
         beam, tries = self._started(layer, around, worth), 0
         seen = list(beam)
         while tries < most and beam[0].error > worth.least and len(beam[0].layer.structure) <= MOST_JOINED:
             tries += 1
-            ranked = worth.best([*beam, *self._grown(beam, around, worth)])
-            sharp = worth.distinct((tried for tried in ranked if is_sharp(tried.layer)), around, BEAM)
-            soft = [tried for tried in ranked if not is_sharp(tried.layer)][:1]  # no rival of the sharp ones
-            chosen = sorted([*sharp, *soft], key=worth.of)
+            chosen = worth.beam([*beam, *self._grown(beam, around, worth)], around)
             gain, beam = worth.of(beam[0]) - worth.of(chosen[0]), chosen
             seen += beam
             if gain < LEAST_GAIN:
                 break
         ranked = replace(worth, price=PRICE).best(seen)
         return ranked[:REFINED], max(tries, 1)
+
+    def worth(self, around: Surroundings, price: float) -> Worth:
+        """How good layers are in these surroundings."""
+        bare = float(around.residual().square().mean())
+        least = max(LEAST_SHARE * bare, LEAST_ERROR)
+        return Worth(around.scene.layer_count, least, price, self.falloff[0])
 
     def refined(self, layer: Group, around: Surroundings) -> Tried:
         """A layer after some more steps down the squared error."""
@@ -204,31 +208,27 @@ class Search:
         rows, errors = descend(layer.rows(), around.problem(structure), numbers, steps, self.tick)
         return Tried(_of_rows(structure, layer.order, rows), float(errors[0]))
 
-    def _searched(self, tried: Tried, around: Surroundings, steps: int) -> Tried:
+    def _searched(self, layer: Group, around: Surroundings, worth: Worth, steps: int) -> Tried:
         """A layer after so many steps; what is sharp stays so, as softness makes up for shapes that are missing."""
-        return self._trained(
-            tried.layer,
-            around,
-            steps,
-            lambda slot: slot.parameter.unit not in (FALLOFF, SMOOTHNESS) or not is_sharp(tried.layer),
-        )
+        still = (FALLOFF, SMOOTHNESS) if worth.is_sharp(layer) else ()
+        return self._trained(layer, around, steps, lambda slot: slot.parameter.unit not in still)
 
     def _started(self, layer: Group, around: Surroundings, worth: Worth) -> list[Tried]:
         """The layer, and some of one shape that are begun anew: the nearest, and one from which to cut."""
         is_patch = KINDS[layer.structure[0].kind].patch is not None
-        old = [] if is_patch else [self._searched(Tried(layer, 0.0), around, TRAINING)]
-        places = alone(layer, self._color(around), around)
+        old = [] if is_patch else [self._searched(layer, around, worth, TRAINING)]
+        places = alone(layer, self._color(around), self.falloff[0], around)
         near, wide = (worth.best(found) for found in self._proposer(around).candidates(places, around))
-        anew = [self._searched(tried, around, TRAINING) for tried in near]
+        anew = [self._searched(tried.layer, around, worth, TRAINING) for tried in near]
         whole = [Tried(tried.layer, around.error(tried.layer)) for tried in wide[:1]]
         return sorted([*old, *worth.distinct(anew, around, BEAM), *whole], key=worth.of)
 
     def _grown(self, beam: list[Tried], around: Surroundings, worth: Worth) -> list[Tried]:
         """The most promising changes of some layers, trained: a shape joined, exchanged, or left out."""
         proposed = (tried for old in beam for tried in self._proposed(old, around, worth))
-        screened = [self._searched(tried, around, SCREENING) for tried in proposed]
+        screened = [self._searched(tried.layer, around, worth, SCREENING) for tried in proposed]
         best = worth.distinct(screened, around, TRAINED)
-        return [self._searched(tried, around, TRAINING) for tried in best]
+        return [self._searched(tried.layer, around, worth, TRAINING) for tried in best]
 
     def _proposed(self, tried: Tried, around: Surroundings, worth: Worth) -> list[Tried]:
         """The most promising changes of a layer, and the part that matters least left out."""

@@ -13,6 +13,7 @@ import torch
 
 FIRST_DAMPING, LESS, MORE = 0.1, 0.3, 5.0  # of a step; after one that helps, after one that does not
 MOST_DAMPED, LEAST_DAMPED = 1e4, 1e-7
+HARDLY, PATIENCE = 1e-3, 3  # share of the error; steps
 TINY = 1e-9
 
 
@@ -40,8 +41,10 @@ def descend(
 ) -> tuple[torch.Tensor, torch.Tensor]:
     """Candidates [G, U] after so many steps down their mean squared residuals; and these, [G].
 
-    A step that does not help is not made. `tick` is told the least of the errors after every step.
+    A step that does not help is not made; it ends early where `PATIENCE` steps have hardly helped any candidate. `tick`
+    is told the least of the errors after every step.
     """
+    idle = 0
     damping = rows.new_full((len(rows),), FIRST_DAMPING)
     errors = problem.errors(rows)
     for _ in range(steps):
@@ -51,10 +54,13 @@ def descend(
         numbers.project(moved)
         found = problem.errors(moved)
         better = found < errors
+        idle = 0 if bool((found < errors * (1.0 - HARDLY)).any()) else idle + 1
         rows = torch.where(better[:, None], moved, rows)
         errors = torch.where(better, found, errors)
         damping = (damping * torch.where(better, LESS, MORE)).clamp(LEAST_DAMPED, MOST_DAMPED)
         tick(float(errors.min()))
+        if idle == PATIENCE:
+            break
     return rows, errors
 
 
