@@ -80,12 +80,9 @@ def side_by_side(pictures: dict[str, Picture], found: dict[str, list[tuple[Fitte
     return encode_png(np.hstack(columns).astype(np.float32))
 
 
-def page(seeds: int, output: Path) -> str:
-    """The table; the figure is written on the way."""
-    pictures = {name: picture(body, SIDE) for name, body in DRAWN.items()}
-    found = {name: [_fit(name, drawn, seed) for seed in range(seeds)] for name, drawn in pictures.items()}
-    shown = output.with_suffix(".png")
-    write_atomically(shown, side_by_side(pictures, found))
+def page(found: dict[str, list[tuple[Fitted, Scene]]], output: Path, shown: Path) -> str:
+    """What was found of each picture, as a table, and the name of the figure."""
+    seeds = min(map(len, found.values()))
     return (
         "\n\n".join(
             (
@@ -105,7 +102,10 @@ def page(seeds: int, output: Path) -> str:
 
 def _fit(name: str, drawn: Picture, seed: int) -> tuple[Fitted, Scene]:
     fitted, scene = measured(drawn, 1, kind="mixed", preset="fast", cuts=CUTS, seed=seed)
-    print(f"{name}, seed {seed}: {fitted.psnr:.1f} dB, {structure(scene.layers[0])}", flush=True)
+    print(
+        f"{name}, seed {seed}: {fitted.psnr:.1f} dB, {fitted.cpu:.0f} s, {structure(scene.layers[0])}",
+        flush=True,
+    )
     return fitted, scene
 
 
@@ -115,7 +115,14 @@ def main() -> None:
     parser.add_argument("--seeds", type=int, default=SEEDS)
     parser.add_argument("-o", "--output", type=Path, required=True)
     options = parser.parse_args()
-    write_atomically(options.output, page(options.seeds, options.output).encode())
+    pictures = {name: picture(body, SIDE) for name, body in DRAWN.items()}
+    found: dict[str, list[tuple[Fitted, Scene]]] = {name: [] for name in pictures}
+    shown = options.output.with_suffix(".png")
+    for seed in range(options.seeds):  # written after each: it takes long
+        for name, drawn in pictures.items():
+            found[name].append(_fit(name, drawn, seed))
+        write_atomically(shown, side_by_side(pictures, found))
+        write_atomically(options.output, page(found, options.output, shown).encode())
 
 
 if __name__ == "__main__":

@@ -179,12 +179,13 @@ class Search:
         """
         worth = self.worth(around, FIRST_PRICE)
         beam, tries = self._started(layer, around, worth), 0
-        seen = list(beam)
-        while tries < most and beam[0].error > worth.least and len(beam[0].layer.structure) <= MOST_JOINED:
+        seen, fresh = list(beam), beam
+        while tries < most and fresh and beam[0].error > worth.least:
             tries += 1
-            chosen = worth.beam([*beam, *self._grown(beam, around, worth)], around)
+            chosen = worth.beam([*beam, *self._grown(fresh, around, worth)], around)
+            fresh = [new for new in chosen if all(new is not old for old in beam)]
             gain, beam = worth.of(beam[0]) - worth.of(chosen[0]), chosen
-            seen += beam
+            seen += fresh
             if gain < LEAST_GAIN:
                 break
         ranked = replace(worth, price=PRICE).best(seen)
@@ -225,7 +226,12 @@ class Search:
 
     def _grown(self, beam: list[Tried], around: Surroundings, worth: Worth) -> list[Tried]:
         """The most promising changes of some layers, trained: a shape joined, exchanged, or left out."""
-        proposed = (tried for old in beam for tried in self._proposed(old, around, worth))
+        proposed = (
+            tried
+            for old in beam
+            if len(old.layer.structure) < MOST_JOINED
+            for tried in self._proposed(old, around, worth)
+        )
         screened = [self._searched(tried.layer, around, worth, SCREENING) for tried in proposed]
         best = worth.distinct(screened, around, TRAINED)
         return [self._searched(tried.layer, around, worth, TRAINING) for tried in best]
