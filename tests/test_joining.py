@@ -39,6 +39,9 @@ PICTURES = {
             (np.maximum(abs(x) / 0.75, abs(y) / 0.6) < 1) & (np.maximum(abs(x) / 0.5, abs(y) / 0.35) > 1)
         )
     ),
+    "spoked": sampled(
+        lambda x, y: ((np.hypot(x, y) < 0.6) | ((abs(x) < 0.15) & (abs(y) < 0.85))) & (np.hypot(x, y) > 0.3)
+    ),
 }
 
 
@@ -73,6 +76,13 @@ def test_a_hole_is_cut_out(name, kind):
     assert near >= 38.0
     assert [shape.kind for shape in layer.shapes] == [kind, kind]
     assert [joint.join for joint in layer.joints] == ["subtraction"]
+
+
+def test_a_bar_is_united_with_a_disc_before_the_hole_is_cut():
+    scene, near = joined(PICTURES["spoked"], ("circle", "box"), most=6)
+    (layer,) = scene.layers
+    assert near >= 38.0
+    assert [joint.join for joint in layer.joints] == ["union", "subtraction"]
 
 
 def test_a_disc_stays_one_circle():
