@@ -47,11 +47,17 @@ def test_starts_by_hand(unit, values, start):
     assert unit.start(values, PLACED)[0].tolist() == pytest.approx(start, abs=1e-6)
 
 
-def test_starts_are_stretched_before_they_are_turned():
+@pytest.mark.parametrize(
+    ("unit", "values", "start"),
+    [
+        (units.LENGTH, (0.5, 3.0), (3.0, 3.0)),
+        (units.LENGTH, (0.5,), (1.0,)),  # of no direction
+        (units.POSITION, (0.5, 0.25), (0.05, 2.8)),
+    ],
+)
+def test_starts_are_stretched_before_they_are_turned(unit, values, start):
     placed = PLACED._replace(stretches=torch.tensor([[3.0, 0.5]]))
-    assert units.LENGTH.start((0.5, 3.0), placed)[0].tolist() == [3.0, 3.0]
-    assert units.LENGTH.start((0.5,), placed)[0].tolist() == [1.0]
-    assert units.POSITION.start((0.5, 0.25), placed)[0].tolist() == pytest.approx([0.05, 2.8], abs=1e-6)
+    assert unit.start(values, placed)[0].tolist() == pytest.approx(start, abs=1e-6)
 
 
 @pytest.mark.parametrize(
