@@ -35,7 +35,7 @@ from .weights import weights_for
 
 THICKEN_EVERY = 10  # steps
 AREA_WEIGHT = 1.0  # of the area constraint in the loss
-JOIN_STEPS = 150  # about, of one try to join a shape to a layer
+JOIN_STEPS = 350  # about, of one try to join a shape to a layer
 TRIAL_LAYERS, TRIAL_STEPS, TRIAL_RATE = 4, 60, 0.5
 REFIT_STEPS = 100  # after the colours have been restricted
 ANYWHERE = Start("uniform")
