@@ -59,6 +59,7 @@ def row(name: str, found: list[tuple[Fitted, Scene]]) -> str:
     near = np.array([fitted.psnr for fitted, _ in found])
     seconds = float(np.median([fitted.cpu for fitted, _ in found]))
     ((common, times),) = Counter(structure(scene.layers[0]) for _, scene in found).most_common(1)
+    common = common.replace("|", "\\|")  # no end of a cell
     shapes = float(np.median([scene.shape_count for _, scene in found]))
     return (
         f"| {name} | `{common}` ({times} of {len(found)}) | {shapes:g} | {np.median(near):.1f} | {near.min():.1f} "
