@@ -88,7 +88,7 @@ def page(found: dict[str, list[tuple[Fitted, Scene]]], output: Path, shown: Path
         "\n\n".join(
             (
                 "# Known pictures as one layer of joined shapes",
-                f"    python -m sdf2vec.bench.joins -o {output.as_posix()}",
+                f"    python -m sdf2vec.bench.joins --seeds {seeds} -o {output.as_posix()}",
                 f"Drawn by resvg at {SIDE} × {SIDE} pixels, white on black; fitted from one shape by "
                 f'`fit(picture, 1, kind="mixed", preset="fast", cuts={CUTS})`, {seeds} seeds each. `-` is subtraction, '
                 "`&` intersection, `|` union. PSNR is the median over the seeds; resvg's edges are box-filtered, ours "
