@@ -34,11 +34,15 @@ class Room(NamedTuple):
 
 
 class Placed(NamedTuple):
-    """Where shapes start: centres [N, 2] and sizes [N] in scene units, turns [N] in radians; tensors."""
+    """Where shapes start: centres [N, 2] and sizes [N] in scene units, turns [N] in radians; tensors.
+
+    Before they are turned, shapes are scaled along x and along y by factors `stretches` [N, 2], or by one for all.
+    """
 
     centers: Any
     sizes: Any
     turns: Any
+    stretches: Any = 1.0
 
 
 class Fractions(NamedTuple):
@@ -128,16 +132,21 @@ class Parameter:
 
 
 def _turned(values: tuple[float, ...], placed: Placed) -> Any:
-    x, y = (placed.turns.new_tensor(pair) for pair in (values, (-values[1], values[0])))
-    return placed.turns.cos()[:, None] * x + placed.turns.sin()[:, None] * y
+    return _turned_vectors(placed.turns.new_tensor(values)[None], placed)
 
 
-def _start_position(values: tuple[float, ...], placed: Placed) -> Any:
-    return placed.centers + _turned(values, placed) * placed.sizes[:, None]
+def _turned_vectors(vectors: Any, placed: Placed) -> Any:
+    across = vectors.flip(1) * vectors.new_tensor((-1.0, 1.0))
+    return placed.turns.cos()[:, None] * vectors + placed.turns.sin()[:, None] * across
 
 
 def _start_length(values: tuple[float, ...], placed: Placed) -> Any:
-    return placed.sizes.new_tensor(values) * placed.sizes[:, None]
+    sized = placed.sizes.new_tensor(values) * placed.sizes[:, None]
+    return sized * placed.stretches if len(values) == 2 else sized
+
+
+def _start_position(values: tuple[float, ...], placed: Placed) -> Any:
+    return placed.centers + _turned_vectors(_start_length(values, placed), placed)
 
 
 def _start_angle(values: tuple[float, ...], placed: Placed) -> Any:

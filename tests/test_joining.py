@@ -13,6 +13,7 @@ from sdf2vec.fit import joining
 from sdf2vec.fit.initialization import Layers
 from sdf2vec.fit.loop import fit_picture, scaled
 from sdf2vec.fit.settings import Settings, settings_of
+from sdf2vec.fit.surroundings import View
 from sdf2vec.image import Picture
 from sdf2vec.metrics import psnr
 from sdf2vec.render.reference import render
@@ -38,6 +39,9 @@ PICTURES = {
             (np.maximum(abs(x) / 0.75, abs(y) / 0.6) < 1) & (np.maximum(abs(x) / 0.5, abs(y) / 0.35) > 1)
         )
     ),
+    "spoked": sampled(
+        lambda x, y: ((np.hypot(x, y) < 0.6) | ((abs(x) < 0.15) & (abs(y) < 0.85))) & (np.hypot(x, y) > 0.3)
+    ),
 }
 
 
@@ -55,13 +59,12 @@ def started(kind="circle"):
 def joined(pixels, kinds, scene=None, seed=0, most=3):
     """What joining makes of a scene, as a scene again, and how near that is."""
     target = torch.from_numpy(np.ascontiguousarray(pixels.transpose(2, 0, 1)))
-    coarse = scaled(pixels, joining.RESOLUTION)
     search = joining.Search(
         Layers(kinds, "over"), (0.0, 1.5), torch.Generator().manual_seed(seed), lambda error: None, 1.0 / SIDE
     )
     tensors = from_scene(scene or started())
-    views = joining.View(coarse, None), joining.View(target, None)
-    *_, tensors = joining.join(tensors, *views, search, most)
+    sizes = scaled(pixels, joining.RESOLUTIONS[0]), target
+    *_, tensors = joining.join(tensors, [View(size, None) for size in sizes], search, most)
     found = to_scene(tensors, SIDE, SIDE)
     return found, float(psnr(render(found)[:3], target))
 
@@ -73,6 +76,13 @@ def test_a_hole_is_cut_out(name, kind):
     assert near >= 38.0
     assert [shape.kind for shape in layer.shapes] == [kind, kind]
     assert [joint.join for joint in layer.joints] == ["subtraction"]
+
+
+def test_a_bar_is_united_with_a_disc_before_the_hole_is_cut():
+    scene, near = joined(PICTURES["spoked"], ("circle", "box"), most=6)
+    (layer,) = scene.layers
+    assert near >= 38.0
+    assert [joint.join for joint in layer.joints] == ["union", "subtraction"]
 
 
 def test_a_disc_stays_one_circle():

@@ -48,6 +48,19 @@ def test_starts_by_hand(unit, values, start):
 
 
 @pytest.mark.parametrize(
+    ("unit", "values", "start"),
+    [
+        (units.LENGTH, (0.5, 3.0), (3.0, 3.0)),
+        (units.LENGTH, (0.5,), (1.0,)),  # of no direction
+        (units.POSITION, (0.5, 0.25), (0.05, 2.8)),
+    ],
+)
+def test_starts_are_stretched_before_they_are_turned(unit, values, start):
+    placed = PLACED._replace(stretches=torch.tensor([[3.0, 0.5]]))
+    assert unit.start(values, placed)[0].tolist() == pytest.approx(start, abs=1e-6)
+
+
+@pytest.mark.parametrize(
     ("unit", "values", "kept"),
     [
         (units.POSITION, (9.0, -9.0), (1.05, -0.8)),  # 0.3 beyond the canvas

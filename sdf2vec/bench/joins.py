@@ -57,8 +57,9 @@ def structure(layer: Layer) -> str:
 def row(name: str, found: list[tuple[Fitted, Scene]]) -> str:
     """One picture's row of the table."""
     near = np.array([fitted.psnr for fitted, _ in found])
-    seconds = float(np.median([fitted.seconds for fitted, _ in found]))
+    seconds = float(np.median([fitted.cpu for fitted, _ in found]))
     ((common, times),) = Counter(structure(scene.layers[0]) for _, scene in found).most_common(1)
+    common = common.replace("|", "\\|")  # no end of a cell
     shapes = float(np.median([scene.shape_count for _, scene in found]))
     return (
         f"| {name} | `{common}` ({times} of {len(found)}) | {shapes:g} | {np.median(near):.1f} | {near.min():.1f} "
@@ -68,7 +69,7 @@ def row(name: str, found: list[tuple[Fitted, Scene]]) -> str:
 
 def table(found: dict[str, list[tuple[Fitted, Scene]]]) -> Iterator[str]:
     """All rows."""
-    yield f"| picture | structure most often found | shapes | PSNR dB | worst | ≥ {ENOUGH:g} dB | seconds |"
+    yield f"| picture | structure most often found | shapes | PSNR dB | worst | ≥ {ENOUGH:g} dB | CPU seconds |"
     yield "|---|---|---:|---:|---:|---:|---:|"
     for name, fits in found.items():
         yield row(name, fits)
@@ -80,21 +81,18 @@ def side_by_side(pictures: dict[str, Picture], found: dict[str, list[tuple[Fitte
     return encode_png(np.hstack(columns).astype(np.float32))
 
 
-def page(seeds: int, output: Path) -> str:
-    """The table; the figure is written on the way."""
-    pictures = {name: picture(body, SIDE) for name, body in DRAWN.items()}
-    found = {name: [_fit(name, drawn, seed) for seed in range(seeds)] for name, drawn in pictures.items()}
-    shown = output.with_suffix(".png")
-    write_atomically(shown, side_by_side(pictures, found))
+def page(found: dict[str, list[tuple[Fitted, Scene]]], output: Path, shown: Path) -> str:
+    """What was found of each picture, as a table, and the name of the figure."""
+    seeds = min(map(len, found.values()))
     return (
         "\n\n".join(
             (
                 "# Known pictures as one layer of joined shapes",
-                f"    python -m sdf2vec.bench.joins -o {output.as_posix()}",
+                f"    python -m sdf2vec.bench.joins --seeds {seeds} -o {output.as_posix()}",
                 f"Drawn by resvg at {SIDE} × {SIDE} pixels, white on black; fitted from one shape by "
                 f'`fit(picture, 1, kind="mixed", preset="fast", cuts={CUTS})`, {seeds} seeds each. `-` is subtraction, '
                 "`&` intersection, `|` union. PSNR is the median over the seeds; resvg's edges are box-filtered, ours "
-                "logistic: the exact ring has about 43 dB. Seconds are the median.",
+                "logistic: the exact ring has about 43 dB. Seconds are the median of user and system time.",
                 "\n".join(table(found)),
                 f"![The pictures above, the renders of seed 0 below]({shown.name})",
             )
@@ -105,7 +103,10 @@ def page(seeds: int, output: Path) -> str:
 
 def _fit(name: str, drawn: Picture, seed: int) -> tuple[Fitted, Scene]:
     fitted, scene = measured(drawn, 1, kind="mixed", preset="fast", cuts=CUTS, seed=seed)
-    print(f"{name}, seed {seed}: {fitted.psnr:.1f} dB, {structure(scene.layers[0])}", flush=True)
+    print(
+        f"{name}, seed {seed}: {fitted.psnr:.1f} dB, {fitted.cpu:.0f} s, {structure(scene.layers[0])}",
+        flush=True,
+    )
     return fitted, scene
 
 
@@ -115,7 +116,14 @@ def main() -> None:
     parser.add_argument("--seeds", type=int, default=SEEDS)
     parser.add_argument("-o", "--output", type=Path, required=True)
     options = parser.parse_args()
-    write_atomically(options.output, page(options.seeds, options.output).encode())
+    pictures = {name: picture(body, SIDE) for name, body in DRAWN.items()}
+    found: dict[str, list[tuple[Fitted, Scene]]] = {name: [] for name in pictures}
+    shown = options.output.with_suffix(".png")
+    for seed in range(options.seeds):  # written after each: it takes long
+        for name, drawn in pictures.items():
+            found[name].append(_fit(name, drawn, seed))
+        write_atomically(shown, side_by_side(pictures, found))
+        write_atomically(options.output, page(found, options.output, shown).encode())
 
 
 if __name__ == "__main__":

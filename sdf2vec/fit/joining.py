@@ -1,94 +1,94 @@
 """Shapes joined to layers by trial: cut out of them, added to them, or intersected with them.
 
-Which join helps is a decision, not a number that could be descended; so every candidate is trained for some steps, and
-the best is kept where the error falls. All of it happens at low resolution by the dense renderer, candidates of one
-structure at a time in one tensor: kernels would have to be compiled for every structure.
+Which join helps is a decision, not a number that could be descended; so candidates are trained for some steps, and
+the best is kept where the error falls by more than its numbers are worth. All of it happens at low resolution by the
+dense renderer: kernels would have to be compiled for every structure.
 """
 
 from __future__ import annotations
 
 import math
 import operator
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
-from typing import NamedTuple
 
 import torch
 
-from ..blend import JOINS
-from ..layer import Part, Slot, row_width
-from ..paints import BASE, FLAT
-from ..render.reference import canvas, composite_points, group_coverage, lay, layers_at
+from ..layer import Slot, Structure, row_width, slots
+from ..render.reference import composite_points, layers_at
 from ..render.tensors import Group, SceneTensors
 from ..shapes import KINDS
-from ..units import COLOR, SMOOTHNESS, Placed
+from ..units import FALLOFF, SMOOTHNESS
 from .adam import rate_of
+from .candidates import Proposer, Tried, alone, openings, reductions
 from .constraints import project
-from .initialization import Layers, Places, groups_at, start_of, straight
-from .matching_pursuit import find_discs
+from .initialization import Layers, straight
+from .levenberg import Numbers, descend
+from .surroundings import Surroundings, View, points_of, some
 
-RESOLUTION = 40  # pixels squared at which candidates are tried
-STARTS = 3  # of each kind and join
-SCREENING, TRAINING = 6, 12  # steps of every candidate; of the best few after that
-FINALISTS, BEAM = 9, 2  # structures that are trained on; that go on to have more joined
-REFINING = 20  # steps at the end
+RESOLUTIONS = 40, 80  # pixels squared at which candidates are tried; at which the best are refined first
+SCREENING, TRAINING = 4, 10  # steps of every finalist; of the best of them after that
+FINALISTS, TRAINED, BEAM = (
+    4,
+    4,
+    3,
+)  # changes of a layer that are screened; that are trained; that are built on
+KINDS_EACH = 2  # finalists of other kinds of shape in the same place
+ALIKE = 0.1  # squared difference of two layers that look the same, in shares of the error
+REFINED, REFINING = 2, 20  # layers that are refined at the end; steps at each resolution
 MOST_JOINED = 24  # shapes in one layer
-FIRST_DAMPING, LESS, MORE = 0.1, 0.3, 5.0  # of a step; after one that helps, after one that does not
 LONGEST_STEP = 20.0  # rates
-TINY = 1e-9
-SMALL = 2e-4  # change of a number that its derivative is taken from
-LEAST_GAIN = 0.03  # of a layer's share of the error: what a join must take away to be kept
-LEAST_ERROR = 5e-5  # mean square: below it nothing is missing
-START_SMOOTHNESS = 0.01  # scene units
-SURPLUS = 0.25  # how much an error matters, at first, where nothing is wanted
-MISSING = 0.1  # share of all that is missing from a layer from which on it is worth adding; so with too much
+PRICE = 0.03  # of a number: the part of a layer's share of the error that it must take away
+FIRST_PRICE = 0.004  # while others may follow
+LEAST_GAIN = 0.03  # of the worth of the best layer: with less the search ends
+LEAST_ERROR = 1e-9  # mean square: of a picture that needs no layer
+LEAST_SHARE = 5e-4  # of what is missing without the layer, squared: below it nothing is missing
 
 Tick = Callable[[float], None]  # told of the error after every step; raises to stop
 
 
-class View(NamedTuple):
-    """A picture at some size: premultiplied [C, H, W], and how much an error matters there [H, W], or None."""
-
-    target: torch.Tensor
-    weights: torch.Tensor | None
-
-
 @torch.no_grad()
-def join(scene: SceneTensors, coarse: View, fine: View, search: Search, most: int) -> Iterator[SceneTensors]:
+def join(scene: SceneTensors, views: Sequence[View], search: Search, most: int) -> Iterator[SceneTensors]:
     """The scene after each of its layers has had shapes joined to it, the worst first; tried `most` times in all.
 
-    Tried at the resolution of one picture, refined at that of the other.
+    Tried at the resolution of the first picture, refined at those of the others; never worse at the last.
     """
-    scene, left = _grounded(scene, coarse), list(range(scene.layer_count))
+    coarse, *finer = views
+    scene, left = _grounded(_detached(scene), finer[-1]), list(range(scene.layer_count))
     while left and most > 0:
         order = max(left, key=_faults(scene, coarse).__getitem__)
         left.remove(order)
-        (layer,) = _some(scene, partial(operator.eq, order)).groups
-        found, tries = search.joined(layer, Surroundings.of(scene, order, *coarse), most)
-        if found.layer is not layer:
-            layer = search.refined(found.layer, Surroundings.of(scene, order, *fine))
-            scene = _grounded(_replaced(scene, replace(layer, order=torch.tensor([order]))), fine)
+        (layer,) = some(scene, partial(operator.eq, order)).groups
+        found, tries = search.joined(layer, Surroundings.of(scene, order, coarse), most)
+        for view in finer:
+            around = Surroundings.of(scene, order, view)
+            refined = [search.refined(tried.layer, around) for tried in found]
+            found = [best] = [min(refined, key=search.worth(around, PRICE).of)]
+        if best.error < around.error(layer):
+            changed = _replaced(scene, replace(best.layer, order=torch.tensor([order])))
+            scene = _grounded(changed, finer[-1])
         most -= tries
-        yield scene
+        yield _detached(scene)
+
+
+def _detached(scene: SceneTensors) -> SceneTensors:
+    """A copy with tensors of its own, that no derivative reaches."""
+    groups = [group.each(lambda tensor: tensor.detach().clone()) for group in scene.groups]
+    return replace(scene, groups=groups, background=scene.background.detach().clone())
 
 
 def _faults(scene: SceneTensors, view: View) -> list[float]:
     """For each layer in draw order, how wrong the picture is where it covers."""
-    covers, _ = layers_at(scene, *_points(scene, view))
+    covers, _ = layers_at(scene, *points_of(scene, view))
     faults: list[float] = (covers @ _wrong(scene, view)).tolist()
     return faults
 
 
 def _wrong(scene: SceneTensors, view: View) -> torch.Tensor:
     """Squared errors [P] at the points of a picture, summed over the channels."""
-    wrong = composite_points(scene, *_points(scene, view))[: len(view.target)] - view.target.flatten(1)
+    wrong = composite_points(scene, *points_of(scene, view))[: len(view.target)] - view.target.flatten(1)
     return (wrong if view.weights is None else wrong * view.weights.flatten()).square().sum(0)
-
-
-def _points(scene: SceneTensors, view: View) -> tuple[torch.Tensor, torch.Tensor, torch.Tensor]:
-    x, y, pixel = canvas(scene, view.target.shape[2], view.target.shape[1])
-    return x, y, pixel
 
 
 def _grounded(scene: SceneTensors, view: View) -> SceneTensors:
@@ -96,7 +96,7 @@ def _grounded(scene: SceneTensors, view: View) -> SceneTensors:
     if scene.transparent:
         return scene
     light, dark = (
-        composite_points(replace(scene, background=torch.full((4,), end)), *_points(scene, view))
+        composite_points(replace(scene, background=torch.full((4,), end)), *points_of(scene, view))
         for end in (1.0, 0.0)
     )
     colors, order = view.target.flatten(1).sort(dim=1)
@@ -108,7 +108,7 @@ def _grounded(scene: SceneTensors, view: View) -> SceneTensors:
 
 def _replaced(scene: SceneTensors, layer: Group) -> SceneTensors:
     """The scene with another layer in the place of that with the same draw order."""
-    groups = list(_some(scene, lambda place: place != layer.order).groups)
+    groups = list(some(scene, lambda place: place != layer.order).groups)
     for index, group in enumerate(groups):
         if group.structure == layer.structure:
             groups[index] = group.joined(layer)
@@ -117,106 +117,49 @@ def _replaced(scene: SceneTensors, layer: Group) -> SceneTensors:
 
 
 @dataclass(frozen=True)
-class Surroundings:
-    """All that one layer is seen with, at the points of a small canvas.
+class Worth:
+    """How good a layer is: its error's logarithm, and a price for each of its numbers; the less the better."""
 
-    What is above is linear in what is below it: `dark` and `light` are the scene where that is 0 and 1.
-    """
+    layer_count: int  # each has about an equal share of the error
+    least: float  # mean square: below it nothing is missing
+    price: float
+    sharpest: float  # scene units: the least falloff
 
-    points: tuple[torch.Tensor, torch.Tensor, torch.Tensor]  # x [P], y [P], size of a pixel []
-    target: torch.Tensor  # [C, H, W] premultiplied
-    weights: torch.Tensor  # [P]
-    below: torch.Tensor  # [4, P]
-    dark: torch.Tensor  # [4, P]
-    light: torch.Tensor  # [4, P]
-    scene: SceneTensors
+    def is_sharp(self, layer: Group) -> bool:
+        """Whether its edge has no width of its own."""
+        return float(layer.falloff.max()) <= self.sharpest
 
-    @classmethod
-    def of(
-        cls, scene: SceneTensors, order: int, target: torch.Tensor, weights: torch.Tensor | None
-    ) -> Surroundings:
-        """Those of the layer at this place in the draw order."""
-        x, y, pixel = points = canvas(scene, target.shape[2], target.shape[1])
-        below = _some(scene, lambda place: place < order)
-        above = _some(scene, lambda place: place > order)
-        dark, light = (
-            composite_points(replace(above, background=torch.full((4,), end)), *points) for end in (0.0, 1.0)
-        )
-        own = torch.ones_like(points[0]) if weights is None else weights.flatten()
-        return cls((x, y, pixel), target, own, composite_points(below, *points), dark, light, scene)
+    def of(self, tried: Tried) -> float:
+        """Of those where nothing is missing, the one of fewer numbers is better."""
+        error = math.log(max(tried.error, self.least))
+        return error * self.layer_count + self.price * row_width(tried.layer.structure)
 
-    def images(self, group: Group) -> torch.Tensor:
-        """The scene with each of some layers alone in the place of this one, [G, C, P]."""
-        cover, color = group_coverage(group, self.scene.compositing, *self.points)
-        return self._seen(lay(self.scene.compositing, self.below, color, group.opacity[:, 0], cover))
+    def best(self, all_tried: Iterable[Tried]) -> list[Tried]:
+        """The best of each structure, sharp and soft, the best first."""
+        found: dict[tuple[Structure, bool], Tried] = {}
+        for tried in sorted(all_tried, key=self.of):
+            found.setdefault((tried.layer.structure, self.is_sharp(tried.layer)), tried)
+        return list(found.values())
 
-    def _seen(self, laid: torch.Tensor) -> torch.Tensor:
-        return (self.dark + (self.light - self.dark) * laid)[..., : len(self.target), :]
+    def beam(self, all_tried: Iterable[Tried], around: Surroundings) -> list[Tried]:
+        """Those that are built on, the best first; a soft layer is no rival of sharp ones."""
+        best = self.best(all_tried)
+        sharp = self.distinct((tried for tried in best if self.is_sharp(tried.layer)), around, BEAM)
+        soft = [tried for tried in best if not self.is_sharp(tried.layer)][:1]
+        return sorted([*sharp, *soft], key=self.of)
 
-    def eager(self) -> Surroundings:
-        """Such that it matters less where a layer is and should not be: what is too much can be cut out."""
-        amount = self.residual.square().sum(0).sqrt().flatten()
-        share = SURPLUS + (1.0 - SURPLUS) * amount / amount.max().clamp_min(1e-6)
-        return replace(self, weights=self.weights * share)
-
-    def measured(self, layer: Group) -> Tried:
-        """A layer and its error."""
-        return Tried(layer, float(self.errors(self.images(layer))))
-
-    def errors(self, images: torch.Tensor) -> torch.Tensor:
-        """Weighted mean squared errors [G]."""
-        missing = (images - self.target.flatten(1)) * self.weights
-        return missing.square().mean(dim=(1, 2))
-
-    @property
-    def residual(self) -> torch.Tensor:
-        """What is missing without the layer, [C, H, W]."""
-        bare = self._seen(self.below)
-        return ((self.target.flatten(1) - bare) * self.weights).reshape(self.target.shape)
-
-    def cover(self, layer: Group) -> torch.Tensor:
-        """Coverage of one layer [H, W]."""
-        cover, _ = group_coverage(layer, self.scene.compositing, *self.points)
-        return cover[0].reshape(self.target.shape[1:])
-
-    def missing(self, layer: Group) -> torch.Tensor:
-        """How much more of a layer is wanted at each pixel, −1..1, times how far that is seen; [H, W]."""
-        compositing = self.scene.compositing
-        cover, color = group_coverage(layer, compositing, *self.points)
-        bare, full = (
-            self._seen(lay(compositing, self.below, color, layer.opacity[:, 0], torch.full_like(cover, end)))[
-                0
-            ]
-            for end in (0.0, 1.0)
-        )
-        change = (full - bare) * self.weights
-        wanted = ((self.target.flatten(1) - bare) * self.weights * change).sum(0)
-        seen = change.square().sum(0)
-        more = (wanted / seen.clamp_min(1e-6)).clamp(0.0, 1.0) - cover[0]
-        return (more * seen.sqrt()).reshape(self.target.shape[1:])
-
-
-def _some(scene: SceneTensors, which: Callable[[torch.Tensor], torch.Tensor]) -> SceneTensors:
-    """The layers at some places of the draw order."""
-    picked = [(group, which(group.order).nonzero()[:, 0]) for group in scene.groups]
-    groups = [group.each(partial(_take, rows)) for group, rows in picked if len(rows)]
-    return replace(scene, groups=groups)
-
-
-def _take(rows: torch.Tensor, tensor: torch.Tensor) -> torch.Tensor:
-    return tensor[rows]
-
-
-class Tried(NamedTuple):
-    """One layer after some steps, and its error."""
-
-    layer: Group
-    error: float
-
-
-def _rank(tried: Tried) -> tuple[float, int]:
-    """The less wrong the better; of those where nothing is missing, that of fewer numbers."""
-    return max(tried.error, LEAST_ERROR), row_width(tried.layer.structure)
+    def distinct(self, all_tried: Iterable[Tried], around: Surroundings, most: int) -> list[Tried]:
+        """The best few that don't look alike; of those that do, the one of fewest numbers."""
+        found: list[tuple[Tried, torch.Tensor]] = []
+        for tried in self.best(all_tried):
+            wrong = around.problem(tried.layer.structure).wrong(tried.layer.rows()[..., None])
+            near = ALIKE * max(tried.error, self.least)
+            like = [i for i, (_, other) in enumerate(found) if (wrong - other).square().mean() <= near]
+            if not like:
+                found.append((tried, wrong))
+            elif row_width(tried.layer.structure) < row_width(found[like[0]][0].layer.structure):
+                found[like[0]] = tried, wrong
+        return [tried for tried, _ in found[:most]]
 
 
 @dataclass(frozen=True)
@@ -229,167 +172,109 @@ class Search:
     tick: Tick
     pixel: float  # scene units: the least length
 
-    def joined(self, layer: Group, around: Surroundings, most: int) -> tuple[Tried, int]:
-        """A layer, begun anew where that is better, with shapes joined to it while that helps.
+    def joined(self, layer: Group, around: Surroundings, most: int) -> tuple[list[Tried], int]:
+        """The best few with shapes joined, to a layer or to one begun anew, while that helps.
 
-        Tried `most` times; also how often it was tried. What comes back is never worse than the layer.
+        Tried `most` times; also how often it was tried.
         """
-        before = around.measured(layer)
-        is_patch = KINDS[layer.structure[0].kind].patch is not None
-        beam = self.best([*([] if is_patch else [layer]), *self._alone(around)], around)[:BEAM]
-        if beam[0].error > LEAST_ERROR:
-            beam += [
-                around.measured(wide.layer) for wide in self.best(self._alone(around), around.eager())[:1]
-            ]
-        least, tries = 1.0 - LEAST_GAIN / around.scene.layer_count, 0
-        while tries < most and beam[0].error > LEAST_ERROR and len(beam[0].layer.structure) <= MOST_JOINED:
+        worth = self.worth(around, FIRST_PRICE)
+        beam, tries = self._started(layer, around, worth), 0
+        seen, fresh = list(beam), beam
+        while tries < most and fresh and beam[0].error > worth.least:
             tries += 1
-            grown = self.best((g for start in beam for g in self._candidates(start.layer, around)), around)
-            if not grown or grown[0].error > beam[0].error * least:
+            chosen = worth.beam([*beam, *self._grown(fresh, around, worth)], around)
+            fresh = [new for new in chosen if all(new is not old for old in beam)]
+            gain, beam = worth.of(beam[0]) - worth.of(chosen[0]), chosen
+            seen += fresh
+            if gain < LEAST_GAIN:
                 break
-            beam = grown[:BEAM]
-        return min(before, beam[0], key=_rank), max(tries, 1)
+        ranked = replace(worth, price=PRICE).best(seen)
+        return ranked[:REFINED], max(tries, 1)
 
-    def refined(self, layer: Group, around: Surroundings) -> Group:
-        """A layer after some more steps."""
-        (tried,) = self._trained(layer, around, REFINING)
-        return tried.layer
+    def worth(self, around: Surroundings, price: float) -> Worth:
+        """How good layers are in these surroundings."""
+        bare = float(around.residual().square().mean())
+        least = max(LEAST_SHARE * bare, LEAST_ERROR)
+        return Worth(around.scene.layer_count, least, price, self.falloff[0])
 
-    def best(self, groups: Iterable[Group], around: Surroundings) -> list[Tried]:
-        """Some layers after training, the best first: of all the last shape alone, then the best few structures."""
-        rows = [row for group in groups for row in self._trained(group, around, SCREENING, last=True)]
-        rows.sort(key=lambda row: row.error, reverse=True)
-        finalists = list({row.layer.structure: row for row in rows}.values())
-        finalists.sort(key=lambda row: row.error)
-        trained = [
-            row for tried in finalists[:FINALISTS] for row in self._trained(tried.layer, around, TRAINING)
-        ]
-        return sorted(trained, key=_rank)
+    def refined(self, layer: Group, around: Surroundings) -> Tried:
+        """A layer after some more steps down the squared error."""
+        return self._trained(layer, around, REFINING, lambda slot: True)
 
-    def _trained(self, group: Group, around: Surroundings, steps: int, last: bool = False) -> Iterator[Tried]:
-        """Each layer of a group after so many steps down the squared error, or the last shape and the look only.
+    def _trained(
+        self, layer: Group, around: Surroundings, steps: int, moves: Callable[[Slot], bool]
+    ) -> Tried:
+        structure = layer.structure
+        numbers = self._numbers(around, structure, moves)
+        rows, errors = descend(layer.rows(), around.problem(structure), numbers, steps, self.tick)
+        return Tried(_of_rows(structure, layer.order, rows), float(errors[0]))
 
-        Levenberg's and Marquardt's steps, each number's no longer than `LONGEST_STEP` of its rate.
-        """
-        free, limits = _free(group, around, last)
-        damping = torch.full((len(group),), FIRST_DAMPING)
-        errors = around.errors(around.images(group))
-        for _ in range(steps):
-            step = _descent(group, around, free, damping).clamp(-limits, limits)
-            rows = group.rows()
-            rows[:, free] -= step
-            moved = _of_rows(group, rows)
-            self._project(moved, around)
-            found = around.errors(around.images(moved))
-            better = found < errors
-            group = _of_rows(group, torch.where(better[:, None], moved.rows(), group.rows()))
-            errors = torch.where(better, found, errors)
-            damping = (damping * torch.where(better, LESS, MORE)).clamp(1e-7, 1e4)
-            self.tick(float(errors.min()))
-        for index, error in enumerate(errors.tolist()):
-            yield Tried(group.each(partial(_take, torch.tensor([index]))), error)
+    def _searched(self, layer: Group, around: Surroundings, worth: Worth, steps: int) -> Tried:
+        """A layer after so many steps; what is sharp stays so, as softness makes up for shapes that are missing."""
+        still = (FALLOFF, SMOOTHNESS) if worth.is_sharp(layer) else ()
+        return self._trained(layer, around, steps, lambda slot: slot.parameter.unit not in still)
 
-    def _project(self, group: Group, around: Surroundings) -> None:
-        project(replace(around.scene, groups=[group]), self.pixel, self.falloff)
+    def _started(self, layer: Group, around: Surroundings, worth: Worth) -> list[Tried]:
+        """The layer, and some of one shape that are begun anew: the nearest, and one from which to cut."""
+        is_patch = KINDS[layer.structure[0].kind].patch is not None
+        old = [] if is_patch else [self._searched(layer, around, worth, TRAINING)]
+        places = alone(layer, self._color(around), self.falloff[0], around)
+        near, wide = (worth.best(found) for found in self._proposer(around).candidates(places, around))
+        anew = [self._searched(tried.layer, around, worth, TRAINING) for tried in near]
+        whole = [Tried(tried.layer, around.error(tried.layer)) for tried in wide[:1]]
+        return sorted([*old, *worth.distinct(anew, around, BEAM), *whole], key=worth.of)
 
-    def _alone(self, around: Surroundings) -> list[Group]:
-        """Layers of one shape of each kind, where the picture differs most from what is there without the layer."""
-        residual = around.residual
-        amount = residual.square().sum(0).sqrt()
-        placed = self._placed(amount, around.scene.size)
-        wanted = residual if self.layers.signed else around.target
-        color = straight((wanted * amount).sum(dim=(1, 2))[None] / amount.sum().clamp_min(1e-6))
-        places = Places(placed.centers, placed.sizes, color.expand(STARTS, 4))
-        return [
-            groups_at(places, replace(self.layers, kinds=(kind,), union=1), self.generator)[0]
-            for kind in self._kinds
-        ]
-
-    def _candidates(self, layer: Group, around: Surroundings) -> Iterator[Group]:
-        """The layer with one more shape, of each kind, joined in each way where something is wrong."""
-        missing, cover = around.missing(layer), around.cover(layer)
-        less, more = (-missing).clamp(min=0.0), missing.clamp(min=0.0)
-        rest = float(missing.abs().sum()) * MISSING
-        places = {"union": more, "subtraction": less, "intersection": (cover - less).clamp(min=0.0)}
-        for join, amount in places.items():
-            if (more if JOINS[join].adds else less).sum() > rest:
-                placed = self._placed(amount, around.scene.size)
-                for kind in self._kinds:
-                    yield _extended(layer, self._part(kind, join), placed)
-
-    def _part(self, kind: str, join: str) -> Part:
-        return Part(kind, self.layers.paint if JOINS[join].adds else FLAT, join)
-
-    @property
-    def _kinds(self) -> list[str]:
-        """Those that can be joined."""
-        return [kind for kind in self.layers.kinds if KINDS[kind].patch is None]
-
-    def _placed(self, amount: torch.Tensor, canvas_size: tuple[float, float]) -> Placed:
-        """Where most of an amount [H, W] is: all of it first, then the best discs; turned at random."""
-        height, width = amount.shape
-        found = find_discs(amount[None], STARTS - 1)
-        center, radius = _moments(amount)
-        centers, radii = torch.cat([center[None], found.centers]), torch.cat([radius[None], found.radii])
-        size = torch.tensor(canvas_size)
-        turns = torch.rand(STARTS, generator=self.generator) * 2 * math.pi
-        return Placed(
-            (centers / torch.tensor([width, height]) - 0.5) * size, radii * float(size[0]) / width, turns
+    def _grown(self, beam: list[Tried], around: Surroundings, worth: Worth) -> list[Tried]:
+        """The most promising changes of some layers, trained: a shape joined, exchanged, or left out."""
+        proposed = (
+            tried
+            for old in beam
+            if len(old.layer.structure) < MOST_JOINED
+            for tried in self._proposed(old, around, worth)
         )
+        screened = [self._searched(tried.layer, around, worth, SCREENING) for tried in proposed]
+        best = worth.distinct(screened, around, TRAINED)
+        return [self._searched(tried.layer, around, worth, TRAINING) for tried in best]
+
+    def _proposed(self, tried: Tried, around: Surroundings, worth: Worth) -> list[Tried]:
+        """The most promising changes of a layer, and the part that matters least left out."""
+        places = list(openings(tried.layer, around))
+        found = self._proposer(around).candidates(places, around)
+        kinds = (kind for own in found for kind in worth.best(own)[:KINDS_EACH])
+        fewer = (Tried(less, around.error(less)) for less in reductions(tried.layer))
+        return [*worth.best(kinds)[:FINALISTS], *worth.best(fewer)[:1]]
+
+    def _proposer(self, around: Surroundings) -> Proposer:
+        kinds = tuple(kind for kind in self.layers.kinds if KINDS[kind].patch is None)
+        return Proposer(kinds, self.layers.paint, self.generator, partial(self._numbers, around), self.tick)
+
+    def _color(self, around: Surroundings) -> torch.Tensor:
+        """The mean colour [1, 3] of what a layer should show."""
+        residual = around.residual()
+        amount = residual.square().sum(0).sqrt()
+        wanted = residual if self.layers.signed else around.target
+        return straight((wanted * amount).sum(dim=(1, 2))[None] / amount.sum().clamp_min(1e-6))[:, :3]
+
+    def _numbers(self, around: Surroundings, structure: Structure, moves: Callable[[Slot], bool]) -> Numbers:
+        """Which numbers of a structure's rows move, how far in one step, and what keeps them in their range."""
+        scene = around.scene
+        side = math.sqrt(scene.size[0] * scene.size[1])
+        free = [moves(slot) for slot in slots(structure) for _ in range(slot.parameter.width)]
+        rates = [
+            rate_of(slot.parameter.unit, side, LONGEST_STEP)
+            for slot in slots(structure)
+            for _ in range(slot.parameter.width)
+            if moves(slot)
+        ]
+
+        def keep(rows: torch.Tensor) -> None:
+            group = _of_rows(structure, torch.zeros(1, dtype=torch.int64), rows)
+            project(replace(scene, groups=[group]), self.pixel, self.falloff)
+
+        return Numbers(torch.tensor(free).nonzero()[:, 0], torch.tensor(rates), keep)
 
 
-def _moments(amount: torch.Tensor) -> tuple[torch.Tensor, torch.Tensor]:
-    """The middle [2] of an amount [H, W], and the radius of a disc that is spread as far, in pixels."""
-    height, width = amount.shape
-    share = amount / amount.sum().clamp_min(1e-9)
-    y, x = torch.meshgrid(torch.arange(height) + 0.5, torch.arange(width) + 0.5, indexing="ij")
-    middle = torch.stack([(share * x).sum(), (share * y).sum()])
-    spread = (share * ((x - middle[0]).square() + (y - middle[1]).square())).sum()
-    return middle, (2.0 * spread).sqrt().clamp_min(1.0)
-
-
-def _extended(layer: Group, part: Part, placed: Placed) -> Group:
-    """A layer, once for each place, with one more shape joined to it there."""
-    count = len(placed.sizes)
-    row = layer.each(lambda tensor: tensor.detach().expand(count, *tensor.shape[1:]).clone())
-    smoothness = torch.full((count, 1), START_SMOOTHNESS)
-    looks = {SMOOTHNESS.name: smoothness, COLOR.name: row.of(BASE.name, 0)}
-    index = len(layer.structure)
-    fresh = {Slot(index, parameter): start_of(parameter, placed, looks) for parameter in part.parameters}
-    return Group((*layer.structure, part), row.order, row.values | fresh)
-
-
-def _free(group: Group, around: Surroundings, last: bool) -> tuple[torch.Tensor, torch.Tensor]:
-    """Which numbers of a row move, and how far in one step."""
-    size = around.scene.size
-    side = math.sqrt(size[0] * size[1])
-    moves, limits = [], []
-    for slot in group.values:
-        free = not last or slot.part in (None, len(group.structure) - 1) or slot.parameter.unit is COLOR
-        moves += [free] * slot.parameter.width
-        limits += [rate_of(slot.parameter.unit, side, LONGEST_STEP)] * slot.parameter.width if free else []
-    return torch.tensor(moves).nonzero()[:, 0], torch.tensor(limits)
-
-
-def _descent(layers: Group, around: Surroundings, free: torch.Tensor, damping: torch.Tensor) -> torch.Tensor:
-    """The damped Gauss-Newton steps [G, F] of the free numbers of some layers; derivatives are differences."""
-    rows, count = layers.rows(), len(free)
-    moved = rows[:, None].repeat(1, count + 1, 1)
-    moved[:, torch.arange(count), free] += SMALL
-    images = around.images(_of_rows(layers, moved.flatten(0, 1))).unflatten(0, (-1, count + 1))
-    images = (images - around.target.flatten(1)) * around.weights
-    images = images.flatten(2)  # [G, F + 1, C · P]
-    wrong = images[:, -1:]
-    slopes = (images[:, :-1] - wrong) / SMALL
-    normal = slopes @ slopes.mT
-    scale = normal.diagonal(dim1=1, dim2=2)
-    normal = normal + torch.diag_embed(scale * damping[:, None] + TINY)
-    steps: torch.Tensor = torch.linalg.solve(normal, slopes @ wrong.mT)[..., 0]
-    return steps
-
-
-def _of_rows(like: Group, rows: torch.Tensor) -> Group:
+def _of_rows(structure: Structure, order: torch.Tensor, rows: torch.Tensor) -> Group:
     """Layers of a structure from their rows [G, U]."""
-    parts = rows.split([slot.parameter.width for slot in like.values], dim=1)
-    order = like.order[:1].expand(len(rows))
-    return Group(like.structure, order, dict(zip(like.values, parts, strict=True)))
+    parts = rows.split([slot.parameter.width for slot in slots(structure)], dim=1)
+    return Group(structure, order[:1].expand(len(rows)), dict(zip(slots(structure), parts, strict=True)))

@@ -25,16 +25,17 @@ from .backends import Backend, choose
 from .constraints import enforce_min_thickness, project, too_small
 from .growth import densify, exchange, importance, prune, relocate
 from .initialization import Layers, background_of, empty_groups, place
-from .joining import RESOLUTION as JOIN_RESOLUTION
-from .joining import Search, View, join
+from .joining import RESOLUTIONS as JOIN_RESOLUTIONS
+from .joining import Search, join
 from .losses import Objective, objective
 from .presets import CROWDING, MANY, Phase, Start
 from .settings import Settings, preset_of
+from .surroundings import View
 from .weights import weights_for
 
 THICKEN_EVERY = 10  # steps
 AREA_WEIGHT = 1.0  # of the area constraint in the loss
-JOIN_STEPS = 150  # about, of one try to join a shape to a layer
+JOIN_STEPS = 350  # about, of one try to join a shape to a layer
 TRIAL_LAYERS, TRIAL_STEPS, TRIAL_RATE = 4, 60, 0.5
 REFIT_STEPS = 100  # after the colours have been restricted
 ANYWHERE = Start("uniform")
@@ -259,17 +260,17 @@ class Fit:
 
     def _join(self, fine: Stage) -> None:
         """Joins shapes to layers by trial, on the CPU."""
-        coarse = self._stage(Phase("joining", JOIN_STEPS * self.settings.cuts, JOIN_RESOLUTION))
-        last = self.done + coarse.phase.steps
+        phases = [Phase("joining", JOIN_STEPS * self.settings.cuts, size) for size in JOIN_RESOLUTIONS]
+        views = [*(self._stage(phase).view for phase in phases), fine.view]
+        last = self.done + phases[0].steps
 
         def tick(loss: float) -> None:
             self.done = min(self.done + 1, last)
-            self._report(coarse.phase, loss)
+            self._report(phases[0], loss)
 
         search = Search(_layers_of(self.settings), self.preset.falloff, self.generator, tick, self.pixel)
         try:
-            scenes = join(on_device(self.tensors, "cpu"), coarse.view, fine.view, search, self.settings.cuts)
-            for scene in scenes:
+            for scene in join(on_device(self.tensors, "cpu"), views, search, self.settings.cuts):
                 self.tensors = on_device(scene, self.backend.device)
         finally:  # also when stopped
             self.optimizer = self._adam()

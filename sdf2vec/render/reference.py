@@ -99,7 +99,7 @@ def composite_points(
     layers: dict[int, tuple[torch.Tensor, torch.Tensor, torch.Tensor]] = {}
     for group in tensors.groups:
         cover, color = group_coverage(group, tensors.compositing, x, y, pixel)
-        layers |= zip(group.order.tolist(), zip(cover, color, group.opacity[:, 0], strict=True), strict=True)
+        layers |= zip(group.order.tolist(), zip(cover, color, group.opacity, strict=True), strict=True)
     image = tensors.background[:, None].expand(4, len(x))
     for index in sorted(layers):
         cover, color, opacity = layers[index]
@@ -110,10 +110,10 @@ def composite_points(
 def lay(
     compositing: str, below: torch.Tensor, color: torch.Tensor, opacity: torch.Tensor, cover: torch.Tensor
 ) -> torch.Tensor:
-    """Layers, each on what is below it [4, P]: colours [..., 3, P or 1], opacities [...], coverage [..., P]."""
+    """Layers, each on what is below it [4, P]: colours [..., 3, P or 1], opacities [..., P or 1], coverage [..., P]."""
     blend_color, blend_alpha = _blending(compositing)
-    (rgb,) = blend_color(below[:3], color, opacity[..., None, None], cover[..., None, :])
-    (alpha,) = blend_alpha(below[3], opacity[..., None], cover)
+    (rgb,) = blend_color(below[:3], color, opacity[..., None, :], cover[..., None, :])
+    (alpha,) = blend_alpha(below[3], opacity, cover)
     return torch.cat([rgb, alpha[..., None, :]], dim=-2)
 
 
@@ -121,8 +121,19 @@ def group_coverage(
     group: Group, compositing: str, x: torch.Tensor, y: torch.Tensor, pixel: torch.Tensor
 ) -> tuple[torch.Tensor, torch.Tensor]:
     """Coverage [G, P] and colour [G, 3, P or 1] of a group's layers at points x [P], y [P]."""
-    columns = group.rows().split(1, dim=1)  # [G, 1] each
-    cover, *color = _layer(group.structure, compositing)(x, y, pixel, *columns)
+    return rows_coverage(group.structure, group.rows()[..., None], compositing, x, y, pixel)
+
+
+def rows_coverage(
+    structure: Structure,
+    rows: torch.Tensor,
+    compositing: str,
+    x: torch.Tensor,
+    y: torch.Tensor,
+    pixel: torch.Tensor,
+) -> tuple[torch.Tensor, torch.Tensor]:
+    """The same from the layers' rows [G, U, 1], or from rows of their own for each point [G, U, P]."""
+    cover, *color = _layer(structure, compositing)(x, y, pixel, *rows.unbind(1))
     return cover, torch.stack(color, dim=1)
 
 

@@ -1,0 +1,295 @@
+"""Which shapes could be joined to a layer, where and how: found one at a time, the others as they are.
+
+A picture is linear in what a layer covers, and what a layer covers goes with one shape's own coverage from nothing to
+everything. So for each place among the joins, how wrong a picture is with one more shape is a weighted square of how
+far that shape's coverage is from a mask; shapes of a kind are fitted to all such masks at once, with no formula but
+their own.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
+from functools import cache
+from typing import Any, NamedTuple
+
+import torch
+
+from ..blend import JOINS, SHARPEST
+from ..deferred import deferred
+from ..expr import const, var, vec3, vec4
+from ..layer import JOIN, Part, Slot, Structure, slots
+from ..lower.torch import Tensors, compile_torch
+from ..paints import BASE, FLAT
+from ..render.reference import rows_coverage
+from ..render.tensors import Group
+from ..units import COLOR, FALLOFF, OPACITY, SMOOTHNESS, Placed
+from .initialization import start_of
+from .levenberg import Numbers, Problem, descend
+from .surroundings import Surroundings
+
+ellipses_of: Callable[..., Any] = deferred("sdf2vec.fit.regions", "ellipses")  # scikit-image
+
+KEPT = 6  # starts of a kind in an opening that are trained
+BLURS, STEPS = (3.0, 1.0), 4  # sizes of a pixel in pixels, one after the other; steps with each
+START_SMOOTHNESS = 0.003  # scene units
+EAGER = 0.25  # how much an error matters where a first shape is not wanted: what is too much can be cut out
+LONGER = 1.2  # than wide: most kinds of shape at their start
+FAINT = 1e-8  # of a squared change of the picture
+
+
+class Mask(NamedTuple):
+    """What a shape should cover: with its coverage c [P], errors are (strength·c − amount)², and the rest."""
+
+    strength: torch.Tensor  # [P]
+    amount: torch.Tensor  # [P]
+    rest: float
+
+    @property
+    def gain(self) -> torch.Tensor:
+        """By how much the error falls where all is covered, [P]."""
+        return self.strength * (2.0 * self.amount - self.strength)
+
+    def eager(self) -> Mask:
+        """Such that too much matters less."""
+        share = torch.where(self.gain > 0, 1.0, EAGER)
+        return Mask(self.strength * share, self.amount * share, self.rest)
+
+
+@dataclass(frozen=True)
+class Opening:
+    """A place for one more shape: its number among the parts, its join, its colour [1, 3], what it should cover."""
+
+    layer: Group  # without the shape
+    index: int
+    join: str
+    color: torch.Tensor
+    mask: Mask
+
+    def part(self, kind: str, paint: str) -> Part:
+        """What is put there."""
+        adds = not self.join or JOINS[self.join].adds
+        return Part(kind, paint if adds else FLAT, self.join)
+
+    def structure(self, part: Part) -> Structure:
+        """The layer's with the part."""
+        parts = self.layer.structure
+        return (*parts[: self.index], part, *parts[self.index :])
+
+    def filled(self, part: Part, shape: dict[str, torch.Tensor]) -> Group:
+        """The layer with a part whose shape's numbers are given by name, [1, width] each."""
+        values = {}
+        here = Placed(torch.zeros(1, 2), torch.ones(1), torch.zeros(1))
+        looks = {SMOOTHNESS.name: torch.full((1, 1), START_SMOOTHNESS), COLOR.name: self.color}
+        for slot in slots(self.structure(part)):
+            if slot.part == self.index:
+                own = shape.get(slot.parameter.name)
+                values[slot] = start_of(slot.parameter, here, looks) if own is None else own
+            else:
+                later = slot.part is not None and slot.part > self.index
+                old = Slot(slot.part - 1, slot.parameter) if later and slot.part else slot
+                values[slot] = self.layer.values[old]
+        return Group(self.structure(part), self.layer.order, values)
+
+
+class Tried(NamedTuple):
+    """A layer and its error."""
+
+    layer: Group
+    error: float
+
+
+# --- openings ------------------------------------------------------------------------------------------------
+
+
+def openings(layer: Group, around: Surroundings) -> Iterator[Opening]:
+    """Where a shape can be joined to a layer, and where one can take another's place."""
+    parts, base = layer.structure, layer.of(BASE.name, 0)
+    for join, kind_of_join in JOINS.items():
+        for index in range(1, len(parts) + 1):
+            next_is_alike = index < len(parts) and parts[index].adds == kind_of_join.adds
+            if not next_is_alike:  # else the next place is the same
+                yield _opening(layer, index, join, base, around)
+    for index, part in enumerate(parts):
+        color = layer.of(BASE.name, index) if part.adds else base
+        yield _opening(without(layer, index), index, part.join, color, around)
+
+
+def reductions(layer: Group) -> Iterator[Group]:
+    """A layer without each of its parts, where another is left to begin with."""
+    for index in range(len(layer.structure)):
+        fewer = without(layer, index)
+        if fewer.structure and fewer.structure[0].adds:
+            first = fewer.structure[0]._replace(join="")
+            values = {slot: v for slot, v in fewer.values.items() if slot != Slot(0, JOIN)}
+            yield Group((first, *fewer.structure[1:]), fewer.order, values)
+
+
+def without(layer: Group, index: int) -> Group:
+    """A layer without one of its parts; the next one is not made the first."""
+    parts = layer.structure
+    values = {}
+    for slot, tensor in layer.values.items():
+        if slot.part != index:
+            later = slot.part is not None and slot.part > index
+            values[Slot(slot.part - 1, slot.parameter) if later and slot.part else slot] = tensor
+    return Group((*parts[:index], *parts[index + 1 :]), layer.order, values)
+
+
+def alone(layer: Group, color: torch.Tensor, falloff: float, around: Surroundings) -> list[Opening]:
+    """Where a layer begins anew in a colour [1, 3]: so that no more is covered than wanted, or all that is."""
+    looks = {slot: tensor for slot, tensor in layer.values.items() if slot.part is None}
+    looks |= {slot: torch.ones(1, 1) for slot in looks if slot.parameter.unit is OPACITY}
+    looks |= {slot: torch.full((1, 1), falloff) for slot in looks if slot.parameter.unit is FALLOFF}
+    near = _opening(Group((), layer.order, looks), 0, "", color, around)
+    return [near, Opening(near.layer, 0, "", color, near.mask.eager())]
+
+
+def _opening(layer: Group, index: int, join: str, color: torch.Tensor, around: Surroundings) -> Opening:
+    covers = [_own_cover(layer, part, around) for part in range(len(layer.structure))]
+    joins = [part.join for part in layer.structure]
+    nothing, everything = (torch.full_like(around.points[0], end) for end in (0.0, 1.0))
+    ends = [
+        _joined([*joins[:index], join, *joins[index:]], [*covers[:index], end, *covers[index:]])
+        for end in (nothing, everything)
+    ]
+    opacity = layer.opacity
+    low, high = (around.wrong_with(end[None], color[..., None], opacity)[0] for end in ends)
+    return Opening(layer, index, join, color, _mask(low, high))
+
+
+def _mask(low: torch.Tensor, high: torch.Tensor) -> Mask:
+    """From what is wrong [C, P] with nothing and with all covered."""
+    change = high - low
+    strength = change.square().mean(0).clamp_min(FAINT).sqrt()
+    amount = -(change * low).mean(0) / strength
+    return Mask(strength, amount, float((low.square().mean(0) - amount.square()).mean()))
+
+
+def _own_cover(layer: Group, index: int, around: Surroundings) -> torch.Tensor:
+    """Coverage [P] of one part of a layer alone."""
+    structure = (Part(layer.structure[index].kind),)
+    columns = [
+        torch.zeros(1, slot.parameter.width)
+        if slot.parameter.unit is COLOR
+        else layer.values[slot if slot.part is None else Slot(index, slot.parameter)]
+        for slot in slots(structure)
+    ]
+    rows = torch.cat(columns, dim=1)[..., None]
+    cover, _ = rows_coverage(structure, rows, around.scene.compositing, *around.points)
+    return cover[0]
+
+
+def _joined(joins: Sequence[str], covers: Sequence[torch.Tensor]) -> torch.Tensor:
+    """Coverage [P] of parts together, from that of each: joined as if distances, sharply."""
+    found = covers[0]
+    for join, cover in zip(joins[1:], covers[1:], strict=True):
+        found = 0.5 - _join(join)(0.5 - found, 0.5 - cover)[0]
+    return found
+
+
+@cache
+def _join(join: str) -> Callable[..., Tensors]:
+    """The distance that two distances make together."""
+    distances = var("a"), var("b")
+    a, b = (vec4(vec3(0.0), distance) for distance in distances)
+    return compile_torch([JOINS[join].formula(a, b, const(SHARPEST)).w], distances)
+
+
+# --- shapes for them -------------------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True)
+class Proposer:
+    """What shapes are made of and kept in: kinds, a paint, what randomness comes from, what numbers may be."""
+
+    kinds: tuple[str, ...]
+    paint: str
+    generator: torch.Generator
+    numbers: Callable[[Structure, Callable[[Slot], bool]], Numbers]
+    tick: Callable[[float], None]
+
+    def candidates(self, places: Sequence[Opening], around: Surroundings) -> list[list[Tried]]:
+        """For each opening a layer with the best shape of every kind in it; errors are estimates."""
+        starts = [self._placed(place.mask, around) for place in places]
+        used = [index for index, placed in enumerate(starts) if len(placed.sizes)]
+        found: list[list[Tried]] = [[] for _ in places]
+        for kind in self.kinds if used else ():
+            fitted = self._fitted(kind, [places[i].mask for i in used], [starts[i] for i in used], around)
+            for index, (row, error) in zip(used, fitted, strict=True):
+                place = places[index]
+                layer = place.filled(place.part(kind, self.paint), _shape(kind, row))
+                found[index].append(Tried(layer, error + place.mask.rest))
+        return found
+
+    def _fitted(
+        self, kind: str, masks: Sequence[Mask], starts: Sequence[Placed], around: Surroundings
+    ) -> list[tuple[torch.Tensor, float]]:
+        """For each mask the row [U] of the layer of one shape that comes nearest to it, and its squared error."""
+        structure = (Part(kind),)
+        best = []
+        for mask, placed in zip(masks, starts, strict=True):
+            fresh = _rows(structure, placed)
+            errors = _misses(structure, [mask] * len(fresh), around, BLURS[0]).errors(fresh)
+            best.append(fresh[errors.argsort(stable=True)[:KEPT]])
+        counts = [len(rows) for rows in best]
+        spread = [mask for mask, count in zip(masks, counts, strict=True) for _ in range(count)]
+        numbers = self.numbers(structure, _is_geometry)
+        rows = torch.cat(best)
+        for blur in BLURS:
+            rows, errors = descend(rows, _misses(structure, spread, around, blur), numbers, STEPS, self.tick)
+        return [
+            (own[errors.argmin()], float(errors.min()))
+            for own, errors in zip(rows.split(counts), errors.split(counts), strict=True)
+        ]
+
+    def _placed(self, mask: Mask, around: Surroundings) -> Placed:
+        """The regions of what is wanted: along each, the other way round, and turned at random without stretching."""
+        height, width = around.shape
+        found = torch.tensor(ellipses_of(mask.gain.reshape(height, width).numpy())).reshape(-1, 5)
+        size = torch.tensor(around.scene.size)
+        centers = (found[:, :2] / torch.tensor([width, height]) - 0.5) * size
+        sizes = (found[:, 2] * found[:, 3]).sqrt() * (around.scene.size[0] / width)
+        longer = (found[:, 2] / found[:, 3]).sqrt() / LONGER**0.5
+        stretches = torch.stack([longer, 1.0 / longer], dim=1)
+        turns = torch.rand(len(found), generator=self.generator) * 2 * torch.pi
+        return Placed(
+            centers.repeat(3, 1),
+            sizes.repeat(3),
+            torch.cat([found[:, 4], found[:, 4] + torch.pi, turns]),
+            torch.cat([stretches, stretches, torch.ones_like(stretches)]),
+        )
+
+
+def _is_geometry(slot: Slot) -> bool:
+    return slot.part is not None and slot.parameter.unit is not COLOR
+
+
+def _shape(kind: str, row: torch.Tensor) -> dict[str, torch.Tensor]:
+    """The numbers of a layer's only shape by name, [1, width] each, from the layer's row [U]."""
+    every = slots((Part(kind),))
+    values = row[None].split([slot.parameter.width for slot in every], dim=1)
+    return {slot.parameter.name: v for slot, v in zip(every, values, strict=True) if _is_geometry(slot)}
+
+
+def _rows(structure: Structure, placed: Placed) -> torch.Tensor:
+    """Sharp opaque layers of one shape at some places, [N, U]."""
+    count = len(placed.sizes)
+    looks = {
+        unit.name: torch.full((count, width), value)
+        for unit, width, value in ((OPACITY, 1, 1.0), (FALLOFF, 1, 0.0), (COLOR, 3, 0.0))
+    }
+    return torch.cat([start_of(slot.parameter, placed, looks) for slot in slots(structure)], dim=1)
+
+
+def _misses(structure: Structure, masks: Sequence[Mask], around: Surroundings, blur: float) -> Problem:
+    """How far the coverage of each layer of one shape is from its mask, [G, 1, P]."""
+    strengths = torch.stack([mask.strength for mask in masks])
+    amounts = torch.stack([mask.amount for mask in masks])
+    x, y, pixel = around.points
+
+    def wrong(rows: torch.Tensor) -> torch.Tensor:
+        cover, _ = rows_coverage(structure, rows, around.scene.compositing, x, y, pixel * blur)
+        return (strengths * cover - amounts)[:, None]
+
+    return Problem(wrong, len(x))

@@ -1,0 +1,84 @@
+"""Least squares by damped Gauss-Newton steps (Levenberg 1944, Marquardt 1963), many candidates at a time.
+
+What is wrong at a point depends on the numbers of a candidate and on nothing at other points. So all derivatives come
+from one pass backward in which every point has numbers of its own.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import NamedTuple
+
+import torch
+
+FIRST_DAMPING, LESS, MORE = 0.1, 0.3, 5.0  # of a step; after one that helps, after one that does not
+MOST_DAMPED, LEAST_DAMPED = 1e4, 1e-7
+HARDLY, PATIENCE = 1e-3, 6  # share of the error; steps
+TINY = 1e-9
+
+
+class Problem(NamedTuple):
+    """What is wrong with candidates, [G, C, P], from their rows [G, U, P or 1]; and the number of points."""
+
+    wrong: Callable[[torch.Tensor], torch.Tensor]
+    points: int
+
+    def errors(self, rows: torch.Tensor) -> torch.Tensor:
+        """Mean squares [G] for rows [G, U]."""
+        return self.wrong(rows[..., None]).square().mean(dim=(1, 2))
+
+
+class Numbers(NamedTuple):
+    """Which numbers of a row move [F], how far each may in one step [F], and what keeps rows in their range."""
+
+    free: torch.Tensor
+    longest: torch.Tensor
+    project: Callable[[torch.Tensor], None]
+
+
+def descend(
+    rows: torch.Tensor, problem: Problem, numbers: Numbers, steps: int, tick: Callable[[float], None]
+) -> tuple[torch.Tensor, torch.Tensor]:
+    """Candidates [G, U] after so many steps down their mean squared residuals; and these, [G].
+
+    A step that does not help is not made; it ends early where `PATIENCE` steps have hardly helped any candidate. `tick`
+    is told the least of the errors after every step.
+    """
+    idle = 0
+    damping = rows.new_full((len(rows),), FIRST_DAMPING)
+    errors = problem.errors(rows)
+    for _ in range(steps):
+        moved = rows.clone()
+        step = _step(rows, problem, numbers.free, damping)
+        moved[:, numbers.free] -= step.clamp(-numbers.longest, numbers.longest)
+        numbers.project(moved)
+        found = problem.errors(moved)
+        better = found < errors
+        idle = 0 if bool((found < errors * (1.0 - HARDLY)).any()) else idle + 1
+        rows = torch.where(better[:, None], moved, rows)
+        errors = torch.where(better, found, errors)
+        damping = (damping * torch.where(better, LESS, MORE)).clamp(LEAST_DAMPED, MOST_DAMPED)
+        tick(float(errors.min()))
+        if idle == PATIENCE:
+            break
+    return rows, errors
+
+
+def _step(rows: torch.Tensor, problem: Problem, free: torch.Tensor, damping: torch.Tensor) -> torch.Tensor:
+    """How far the free numbers are too large by the damped normal equations, [G, F]."""
+    wrong, slopes = _slopes(rows, problem, free)
+    normal = slopes @ slopes.mT
+    scale = normal.diagonal(dim1=1, dim2=2)
+    normal = normal + torch.diag_embed(scale * damping[:, None] + TINY)
+    step: torch.Tensor = torch.linalg.solve(normal, slopes @ wrong[..., None])[..., 0]
+    return step
+
+
+def _slopes(rows: torch.Tensor, problem: Problem, free: torch.Tensor) -> tuple[torch.Tensor, torch.Tensor]:
+    """Residuals [G, C · P] and their derivatives by the free numbers [G, F, C · P]."""
+    spread = rows[..., None].repeat(1, 1, problem.points).requires_grad_()
+    with torch.enable_grad():
+        wrong = problem.wrong(spread)
+        sums = wrong.sum(dim=(0, 2)).unbind()
+    channels = [torch.autograd.grad(total, spread, retain_graph=True)[0][:, free] for total in sums]
+    return wrong.detach().flatten(1), torch.stack(channels, dim=2).flatten(2)

@@ -1,0 +1,99 @@
+"""One layer among the others of a scene: how wrong the picture is with what may stand in its place."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from functools import partial
+from typing import NamedTuple
+
+import torch
+
+from ..layer import ROW_OPACITY, Structure
+from ..render.reference import canvas, composite_points, lay, rows_coverage
+from ..render.tensors import Group, SceneTensors
+from .levenberg import Problem
+
+Points = tuple[torch.Tensor, torch.Tensor, torch.Tensor]  # x [P], y [P], size of a pixel []
+
+
+class View(NamedTuple):
+    """A picture at some size: premultiplied [C, H, W], and how much an error matters there [H, W], or None."""
+
+    target: torch.Tensor
+    weights: torch.Tensor | None
+
+
+def points_of(scene: SceneTensors, view: View) -> Points:
+    """The pixel centres of a picture on the scene's canvas."""
+    x, y, pixel = canvas(scene, view.target.shape[2], view.target.shape[1])
+    return x, y, pixel
+
+
+def some(scene: SceneTensors, which: Callable[[torch.Tensor], torch.Tensor]) -> SceneTensors:
+    """The layers at some places of the draw order."""
+    picked = [(group, which(group.order).nonzero()[:, 0]) for group in scene.groups]
+    groups = [group.each(partial(_take, rows)) for group, rows in picked if len(rows)]
+    return replace(scene, groups=groups)
+
+
+def _take(rows: torch.Tensor, tensor: torch.Tensor) -> torch.Tensor:
+    return tensor[rows]
+
+
+@dataclass(frozen=True)
+class Surroundings:
+    """All that one layer is seen with, at the points of a small canvas.
+
+    What is above is linear in what is below it: `dark` and `light` are the scene where that is 0 and 1.
+    """
+
+    points: Points
+    target: torch.Tensor  # [C, H, W] premultiplied
+    weights: torch.Tensor  # [P]
+    below: torch.Tensor  # [4, P]
+    dark: torch.Tensor  # [4, P]
+    light: torch.Tensor  # [4, P]
+    scene: SceneTensors
+
+    @classmethod
+    def of(cls, scene: SceneTensors, order: int, view: View) -> Surroundings:
+        """Those of the layer at this place in the draw order."""
+        points = points_of(scene, view)
+        below = some(scene, lambda place: place < order)
+        above = some(scene, lambda place: place > order)
+        dark, light = (
+            composite_points(replace(above, background=torch.full((4,), end)), *points) for end in (0.0, 1.0)
+        )
+        own = torch.ones_like(points[0]) if view.weights is None else view.weights.flatten()
+        return cls(points, view.target, own, composite_points(below, *points), dark, light, scene)
+
+    @property
+    def shape(self) -> tuple[int, int]:
+        """Height and width in pixels."""
+        return self.target.shape[1], self.target.shape[2]
+
+    def problem(self, structure: Structure) -> Problem:
+        """What is wrong with layers of a structure in the place of this one, weighted."""
+
+        def wrong(rows: torch.Tensor) -> torch.Tensor:
+            cover, color = rows_coverage(structure, rows, self.scene.compositing, *self.points)
+            return self.wrong_with(cover, color, rows[:, ROW_OPACITY - 1])
+
+        return Problem(wrong, len(self.weights))
+
+    def wrong_with(self, cover: torch.Tensor, color: torch.Tensor, opacity: torch.Tensor) -> torch.Tensor:
+        """The same [G, C, P] from coverage [G, P], colours [G, 3, P or 1] and opacities [G, P or 1]."""
+        laid = lay(self.scene.compositing, self.below, color, opacity, cover)
+        seen = (self.dark + (self.light - self.dark) * laid)[..., : len(self.target), :]
+        return (seen - self.target.flatten(1)) * self.weights
+
+    def error(self, layer: Group) -> float:
+        """The weighted mean squared error with a layer in the place of this one."""
+        return float(self.problem(layer.structure).errors(layer.rows()))
+
+    def residual(self) -> torch.Tensor:
+        """What is missing without the layer, weighted, [C, H, W]."""
+        nowhere = torch.zeros_like(self.points[0])[None]
+        wrong = self.wrong_with(nowhere, torch.zeros(1, 3, 1), torch.ones(1, 1))[0]
+        return -wrong.reshape(self.target.shape)
