@@ -2,12 +2,16 @@
 
 import os
 from collections.abc import Callable
+from importlib.util import find_spec
 
 import pytest
 
 from sdf2vec.engines import ENGINES, glslang
 
-MISSING = {name: engine.missing for name, engine in ENGINES.items()} | {"glslang": glslang.missing}
+MISSING = {name: engine.missing for name, engine in ENGINES.items()} | {
+    "glslang": glslang.missing,
+    "triton": lambda: None if find_spec("triton") else "not installed",
+}
 
 
 @pytest.fixture

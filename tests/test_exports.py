@@ -15,8 +15,7 @@ from sdf2vec.fit import conversion
 from sdf2vec.fit.presets import PRESETS
 from sdf2vec.metrics import psnr
 from sdf2vec.render.draw import draw
-
-from .scenes import random_scene
+from tests.scenes import random_scene
 
 OVER = random_scene(("circle",), layers=2, seed=3)
 ADDITIVE = random_scene(("circle",), "additive", layers=2, seed=3)

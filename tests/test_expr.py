@@ -26,8 +26,7 @@ from sdf2vec.expr import (
 from sdf2vec.graph import gradient, hoist, scalarize, substitute, walk
 from sdf2vec.lower.torch import compile_torch
 from sdf2vec.operation import BOOL, FLOAT, VEC2, VEC3
-
-from .operations import MEANINGS, SMOOTH, expected
+from tests.operations import MEANINGS, SMOOTH, expected
 
 a, b, p = var("a"), var("b"), var("p", VEC2)
 ARGUMENTS = [var(name) for name in ("x0", "x1", "x2", "x3", "x4")]

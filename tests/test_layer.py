@@ -15,8 +15,7 @@ from sdf2vec.lower.torch import compile_torch
 from sdf2vec.render.reference import composite, render
 from sdf2vec.render.tensors import from_scene
 from sdf2vec.scene_file import loads
-
-from .scenes import FAMILIES, random_layer_of, scene_of
+from tests.scenes import FAMILIES, random_layer_of, scene_of
 
 STRUCTURES = [structure for structures in FAMILIES.values() for structure in structures]
 NAMES = [str(Formula.of(structure)) for structure in STRUCTURES]
