@@ -12,9 +12,7 @@ from sdf2vec.expr import (
     const,
     constant,
     fixed,
-    function,
     length,
-    let,
     maximum,
     mix,
     operation,
@@ -23,6 +21,7 @@ from sdf2vec.expr import (
     var,
     vec2,
 )
+from sdf2vec.function import function, let
 from sdf2vec.graph import gradient, hoist, scalarize, substitute, walk
 from sdf2vec.lower.torch import compile_torch
 from sdf2vec.operation import BOOL, FLOAT, VEC2, VEC3

@@ -16,25 +16,12 @@ from sdf2vec.engines import chromium
 from sdf2vec.engines.pages import ELEMENT
 from sdf2vec.export import EXPORTERS, Exporter, packing
 from sdf2vec.export.options import SVG_PROFILES, Options
-from sdf2vec.expr import (
-    Expr,
-    absolute,
-    cos,
-    dot,
-    function,
-    length,
-    maximum,
-    minimum,
-    mix,
-    select,
-    sin,
-    vec2,
-    vec4,
-)
+from sdf2vec.expr import Expr, absolute, cos, dot, length, maximum, minimum, mix, select, sin, vec2, vec4
 from sdf2vec.fit.constraints import project
 from sdf2vec.fit.initialization import Layers, place
 from sdf2vec.fit.loop import adam
 from sdf2vec.fit.presets import Start
+from sdf2vec.function import function
 from sdf2vec.layer import Part
 from sdf2vec.operation import FLOAT, VEC4
 from sdf2vec.paints import PAINTS, Paint

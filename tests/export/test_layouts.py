@@ -120,7 +120,8 @@ def test_many_shapes(require_engine):
     for target in ("glsl", "wgsl"):
         made = shader(scene, target, Options())
         assert made.choice.layout == "data"
-        assert made.choice.depth < 60
+        assert made.choice.tiles is not None
+        assert made.choice.tiles.depth < 60
         for size in ((150, 102), (48, 20)):
             drawn = ROUND_TRIPS[target][0].draw(sdf2vec.exported(scene, target), scene, *size)
             assert error_at_some_pixels(scene, drawn) <= 0.05
@@ -211,7 +212,7 @@ def test_only_a_shadertoy_moves():
 def test_lists_hold_all_that_is_seen(compositing, across):
     """Points all over a cell, and beyond the border: a layer with coverage there is listed, or hidden."""
     scene = dataclasses.replace(random_scene(compositing=compositing, layers=40, seed=11), width=90)
-    tiles = bin_layers(scene, scene_grid(scene, across))
+    (tiles,) = bin_layers(scene, [scene_grid(scene, across)])
     x = torch.from_numpy(np.linspace(-1.4, 1.4, 71)).repeat(71)
     y = torch.from_numpy(np.linspace(-1.2, 1.2, 71)).repeat_interleave(71)
     cells = _cell_of(tiles.grid, x.numpy(), y.numpy())
@@ -242,11 +243,11 @@ def _coverages(scene, x, y):
 
 
 def test_lists_are_short_where_shapes_are_small_or_hidden():
-    small = bin_layers(many(300), scene_grid(many(300), 8))
+    (small,) = bin_layers(many(300), [scene_grid(many(300), 8)])
     assert small.depth < 25
     cover_all = Layer((Shape.of("circle", (1, 0, 0), center=(0, 0), radius=5),), 0.1)
     hidden = Scene(60, 40, (*many(50).layers, cover_all))
-    lists = bin_layers(hidden, scene_grid(hidden, 8))
+    (lists,) = bin_layers(hidden, [scene_grid(hidden, 8)])
     inner = [lists.entries[lists.starts[t] : lists.starts[t + 1]].tolist() for t in (15, 16, 40)]
     assert inner == [[50]] * 3
 

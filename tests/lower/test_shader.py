@@ -7,7 +7,8 @@ import pytest
 import torch
 
 from sdf2vec.engines import ENGINES
-from sdf2vec.expr import OPERATIONS, function, let, select, sigmoid, var
+from sdf2vec.expr import OPERATIONS, select, sigmoid, var
+from sdf2vec.function import function, let
 from sdf2vec.lower.shader import GLSL, WGSL, definition, expression, literal, statements, used_functions
 from sdf2vec.lower.torch import compile_torch
 from sdf2vec.operation import FLOAT, VEC2

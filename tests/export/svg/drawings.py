@@ -1,15 +1,24 @@
-"""Scenes of few shapes, and their SVG as text and as elements."""
+"""Scenes of few shapes, their SVG as text and as elements, and what engines make of it."""
 
+import math
 import re
+from functools import cache
 from typing import Any
 from xml.etree import ElementTree
 
+import numpy as np
+import torch
+
 from sdf2vec import Layer, Scene, Shape
+from sdf2vec.engines import ENGINES
 from sdf2vec.export.options import Options
 from sdf2vec.export.svg import svg as write_svg
+from sdf2vec.image import premultiply
+from sdf2vec.render.reference import render
 
 NAMESPACE = "{http://www.w3.org/2000/svg}"
 Parameters = dict[str, Any]
+BLURRING = ("resvg", "librsvg", "chromium", "firefox")
 WHITE, BLACK, ORANGE = (1.0, 1.0, 1.0), (0.0, 0.0, 0.0), (1.0, 0.6, 0.0)
 
 
@@ -25,8 +34,14 @@ def triangle(*points, falloff=0.0, color=WHITE):
     return Layer((Shape.of("triangle", color, a=points[0], b=points[1], c=points[2]),), falloff)
 
 
+@cache
+def made(scene, **options):
+    """A scene's SVG, made once for all that look at it."""
+    return write_svg(scene, Options(**options))
+
+
 def text_of(scene, **options):
-    return write_svg(scene, Options(**options)).data
+    return made(scene, **options).data
 
 
 def parsed(scene, **options):
@@ -40,6 +55,25 @@ def drawn_in(root):
 
 def tags(root):
     return [element.tag.removeprefix(NAMESPACE) for element in root.iter()]
+
+
+@cache
+def rendered(scene, width, height):
+    """What is to be seen, premultiplied [H, W, 4], rendered once for all engines."""
+    image = render(scene, width, height, dtype=torch.float64).permute(1, 2, 0).numpy()
+    image.setflags(write=False)
+    return image
+
+
+def off_in(engine, scene, size=None, **options):
+    """Drawn minus rendered, premultiplied [H, W, 4], 0..1."""
+    width, height = size or (scene.width, scene.height)
+    drawn = premultiply(ENGINES[engine].render(text_of(scene, **options), width, height))
+    return drawn - rendered(scene, width, height)
+
+
+def decibels(off):
+    return -10 * math.log10(float(np.mean(np.square(off))))
 
 
 def numbers_of(path_data):

@@ -5,15 +5,12 @@ import re
 
 import numpy as np
 import pytest
-import torch
 from skimage.morphology import dilation, footprint_rectangle
 
 from sdf2vec import Layer, Scene, Shape
-from sdf2vec.engines import ENGINES
 from sdf2vec.export.svg.blur import best_blur, trial_of
 from sdf2vec.export.svg.canvas import Canvas
 from sdf2vec.export.svg.outlines import edge_of
-from sdf2vec.image import premultiply
 from sdf2vec.render.reference import render
 from sdf2vec.shapes import KINDS
 from tests.export.svg.drawings import (
@@ -25,10 +22,10 @@ from tests.export.svg.drawings import (
     Parameters,
     circle,
     drawn_in,
+    off_in,
     parsed,
     scene_of,
     tags,
-    text_of,
     triangle,
 )
 from tests.scenes import SOFT, random_scene
@@ -40,10 +37,7 @@ def levels_off(require_engine):
     require_engine("resvg")
 
     def difference(scene, width=None, height=None):
-        width, height = width or scene.width, height or scene.height
-        drawn = premultiply(ENGINES["resvg"].render(text_of(scene), width, height))
-        expected = render(scene, width, height, dtype=torch.float64).permute(1, 2, 0).numpy()
-        return 255 * np.abs(drawn - expected)
+        return 255 * np.abs(off_in("resvg", scene, (width, height) if width else None))
 
     return difference
 
