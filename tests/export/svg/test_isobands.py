@@ -4,6 +4,19 @@ import numpy as np
 import pytest
 
 from sdf2vec import Layer, Scene, Shape
+from sdf2vec.export.svg.canvas import Canvas
+from sdf2vec.export.svg.isobands import (
+    FEWEST_BANDS,
+    MOST_BANDS,
+    Band,
+    band_count,
+    band_edges,
+    cover_bands,
+    edge_distance,
+    layer_contours,
+    stacked,
+    trace_grid,
+)
 from sdf2vec.render.reference import render
 from tests.export.svg.drawings import BLURRING, Parameters, off_in, text_of
 
@@ -43,3 +56,43 @@ def test_the_bands_of_a_narrow_edge_are_not_too_many(engine, falloff, require_en
     off = off_in(engine, scene, svg_profile="portable")[..., 0][edge]
     assert abs(off.mean()) <= 4.0 / 255
     assert off.std() <= 11.0 / 255
+
+
+def test_rings_are_their_own_coverage_and_steps_add_what_is_missing():
+    """A quarter, then a third of what is left makes a half, then all."""
+    bands = [Band(0.25, ["outer"]), Band(0.5, ["middle"]), Band(1.0, ["core"])]
+    rings = [(["outer", "middle"], 0.25), (["middle", "core"], 0.5), (["core"], 1.0)]
+    assert list(stacked(bands, True)) == rings
+    assert list(stacked(bands, False)) == [
+        (["outer"], 0.25),
+        (["middle"], pytest.approx(1 / 3)),
+        (["core"], 1.0),
+    ]
+
+
+def test_bands_begin_half_way_between_their_coverages():
+    assert band_edges(3) == [0.125, 0.375, 0.625, 0.875]
+    assert edge_distance(0.5) == pytest.approx(0.5, abs=1e-3)
+    assert edge_distance(0.125) > 0.5 > edge_distance(0.875)
+
+
+def test_the_number_of_bands():
+    """Steps of 1 / n of 255 levels are off by that over the root of 12; an edge of 5 pixels takes 7 bands."""
+    assert band_count(0.0, 1.0) == FEWEST_BANDS
+    assert band_count(1.0, 1e-3) == MOST_BANDS
+    assert band_count(1.0, 255 / 12**0.5 / 10.5) == 10
+    assert band_count(1.0, 1e-3, 5.0) == 7
+
+
+def test_contours_of_a_disc_lie_on_its_edge():
+    canvas = Canvas.of(Scene(300, 200, (), None))
+    disc = Layer((Shape.of("circle", (1, 1, 1), center=(0, 0), radius=0.25),), 0.1)
+    outer, inner = layer_contours(disc, [1.0, 0.0], canvas)
+    assert [band.cover for band in (outer, inner)] == [0.5, 1.0]
+    for band, radius in ((outer, 70.0), (inner, 50.0)):
+        (contour,) = band.contours
+        assert np.abs(np.hypot(*(contour - (150.0, 100.0)).T) - radius).max() < 0.02
+    grid = trace_grid(disc, canvas)
+    assert grid is not None
+    bands = cover_bands(np.clip(0.75 - np.hypot(grid.x[None], grid.y[:, None]), 0, 1), 1, grid, canvas)
+    assert [band.cover for band in bands] == [0.5, 1.0]
