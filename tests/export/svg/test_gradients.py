@@ -1,5 +1,7 @@
 """Coverage said by gradients: where they reach, what they are made of."""
 
+from typing import Any
+
 import numpy as np
 import pytest
 
@@ -30,7 +32,7 @@ def test_a_disc_reaches_as_far_as_its_coverage():
 
 def test_a_square_is_a_slice_beyond_each_side_and_each_corner():
     corners = np.array([[100.0, 50.0], [200.0, 50.0], [200.0, 150.0], [100.0, 150.0]])
-    slices = sliced(corners, 0.0, EDGE, CANVAS).items
+    slices: Any = sliced(corners, 0.0, EDGE, CANVAS).items
     kinds = [type(figure.fill) for figure in slices]
     assert kinds == [LinearGradient] * 4 + [RadialGradient] * 4
     assert not any(figure.antialiased for figure in slices)
@@ -50,7 +52,7 @@ def test_a_point_is_a_whole_turn():
 
 def test_a_gaussian_is_one_gradient():
     shape = Shape.of("gaussian", (1, 0, 0), center=(0, 0), radii=(0.1, 0.05), angle=0.0)
-    figure = radial(Layer((shape,), 0.0, 0.5), (1.0, 0.0, 0.0), CANVAS)
+    figure: Any = radial(Layer((shape,), 0.0, 0.5), (1.0, 0.0, 0.0), CANVAS)
     assert figure.opacity == 0.5
     covers = [stop.opacity for stop in figure.fill.stops]
     assert covers[0] == pytest.approx(1.0, abs=0.01)

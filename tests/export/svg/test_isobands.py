@@ -60,13 +60,14 @@ def test_the_bands_of_a_narrow_edge_are_not_too_many(engine, falloff, require_en
 
 def test_rings_are_their_own_coverage_and_steps_add_what_is_missing():
     """A quarter, then a third of what is left makes a half, then all."""
-    bands = [Band(0.25, ["outer"]), Band(0.5, ["middle"]), Band(1.0, ["core"])]
-    rings = [(["outer", "middle"], 0.25), (["middle", "core"], 0.5), (["core"], 1.0)]
+    outer, middle, core = ([np.full((3, 2), float(i))] for i in range(3))
+    bands = [Band(0.25, outer), Band(0.5, middle), Band(1.0, core)]
+    rings = [(outer + middle, 0.25), (middle + core, 0.5), (core, 1.0)]
     assert list(stacked(bands, True)) == rings
     assert list(stacked(bands, False)) == [
-        (["outer"], 0.25),
-        (["middle"], pytest.approx(1 / 3)),
-        (["core"], 1.0),
+        (outer, 0.25),
+        (middle, pytest.approx(1 / 3)),
+        (core, 1.0),
     ]
 
 

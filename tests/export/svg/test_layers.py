@@ -7,10 +7,11 @@ from sdf2vec.export.svg.display import Figure, Group, LinearGradient, Path, Radi
 from sdf2vec.export.svg.layers import drawing
 from sdf2vec.export.svg.plan import DETAILS, Planner
 from sdf2vec.outlines import EllipseOutline, PolygonOutline
+from tests.export.svg.drawings import Parameters
 
 RED, BLUE = (1.0, 0.0, 0.0), (0.0, 0.0, 1.0)
 DISC = Shape.of("circle", RED, center=(0, 0), radius=0.25)
-CORNERS = {"a": (0, -0.4), "b": (0.3, 0.2), "c": (-0.3, 0.2)}
+CORNERS: Parameters = {"a": (0, -0.4), "b": (0.3, 0.2), "c": (-0.3, 0.2)}
 
 
 def items(*layers, filters=False):

@@ -30,7 +30,9 @@ def test_what_has_no_area_is_its_two_ends():
 
 
 def test_the_core_of_a_rounded_rectangle_is_smaller_by_the_radius():
-    points, rounding = core(RectangleOutline((1.0, 0.0), (0.5, 0.3), math.pi / 2, 0.1))
+    found = core(RectangleOutline((1.0, 0.0), (0.5, 0.3), math.pi / 2, 0.1))
+    assert found is not None
+    points, rounding = found
     assert rounding == 0.1
     assert sorted(np.round(points, 9).tolist()) == [[0.8, -0.4], [0.8, 0.4], [1.2, -0.4], [1.2, 0.4]]
     assert core(EllipseOutline((0.0, 0.0), (1.0, 1.0))) is None
@@ -45,9 +47,11 @@ def test_distances_to_a_rounded_square():
 def test_sharper_corners_keep_the_sides():
     """A rounding of 0.2 taken away moves a square's corners out by 0.2 along both axes."""
     sharp = sharpened(PolygonOutline(tuple(map(tuple, SQUARE)), 0.2), 0.0)
+    assert isinstance(sharp, PolygonOutline)
     assert sharp.rounding == 0
     assert sorted(np.round(sharp.points, 9).tolist()) == [[-0.2, -0.2], [-0.2, 1.2], [1.2, -0.2], [1.2, 1.2]]
-    assert sharpened(RectangleOutline((0, 0), (1, 1), 0.0, 0.4), 0.5).corner_radius == 0.2
+    rounded = RectangleOutline((0.0, 0.0), (1.0, 1.0), 0.0, 0.4)
+    assert sharpened(rounded, 0.5) == RectangleOutline((0.0, 0.0), (1.0, 1.0), 0.0, 0.2)
 
 
 def test_only_turned_rectangles_are_told_as_polygons():
@@ -60,7 +64,11 @@ def test_only_turned_rectangles_are_told_as_polygons():
 
 def test_an_edge_in_user_units():
     layer = Layer((Shape.of("circle", (1, 0, 0), center=(0.25, 0), radius=0.25),), 0.1)
-    found = placed(edge_of(layer, 0.5), Canvas.of(Scene(300, 200, (), None)))
-    assert found == EllipseOutline((200.0, 100.0), (pytest.approx(60.0), pytest.approx(60.0)), 0.0)
+    edge = edge_of(layer, 0.5)
+    assert edge is not None
+    found = placed(edge, Canvas.of(Scene(300, 200, (), None)))
+    assert isinstance(found, EllipseOutline)
+    assert found.center == (200.0, 100.0)
+    assert found.radii == pytest.approx((60.0, 60.0))
     union = Layer.union((*layer.shapes, *layer.shapes), 0.1, 0.1)
     assert edge_of(union, 0.5) is None

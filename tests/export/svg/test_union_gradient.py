@@ -7,10 +7,11 @@ from sdf2vec import Layer, Scene, Shape
 from sdf2vec.export.svg.canvas import Canvas
 from sdf2vec.export.svg.display import LinearGradient
 from sdf2vec.export.svg.union_gradient import fill_of, mean_color, nearest_gradient, ramp_of
+from tests.export.svg.drawings import Parameters
 
 CANVAS = Canvas.of(Scene(300, 200, (), None))
 RED, BLUE = (1.0, 0.0, 0.0), (0.0, 0.0, 1.0)
-PLACE = {"center": (0, 0), "radius": 0.25}
+PLACE: Parameters = {"center": (0, 0), "radius": 0.25}
 
 
 def test_one_colour_is_that_colour():
