@@ -143,7 +143,8 @@ def test_a_text_holds_only_the_structures_it_is_for():
 
 
 def test_kernel_text_is_plain_python():
-    text = kernels.text(tuple(s for structures in FAMILIES.values() for s in structures), "over", 4)
+    every = tuple(s for structures in FAMILIES.values() for s in structures)
+    text = kernels.text(every, "over", 4) + kernels.measuring_text(every)
     compile(text, "kernels", "exec")
     assert "{{" not in text
 
