@@ -12,10 +12,8 @@ from sdf2vec.paints import PAINTS
 from sdf2vec.render import draw, fused, kernels, reference
 from sdf2vec.render.tensors import from_scene
 from sdf2vec.shapes import KINDS
+from tests.render.agreement import VALUES, assert_near_the_reference, outcome
 from tests.scenes import FAMILIES, scene_of
-
-VALUES, GRADIENTS = 1e-4, 1e-3
-
 
 MODULES = [  # each takes half a minute to compile, so not all
     *(("plain", "over"), ("plain", "additive"), ("union", "over"), ("cut", "additive")),
@@ -23,30 +21,8 @@ MODULES = [  # each takes half a minute to compile, so not all
 ]
 
 
-def outcome(composite, scene, size, dtype, channels=4):
-    """The image, and the derivatives of a fixed random sum of it, by the name of what each belongs to."""
-    tensors = from_scene(scene, dtype)
-    named = [(slot.parameter.name, v) for group in tensors.groups for slot, v in group.values.items()]
-    named.append(("background", tensors.background))
-    leaves = [tensor.requires_grad_() for _, tensor in named]
-    image = composite(tensors, *size)[:channels]
-    weights = torch.randn(image.shape, generator=torch.Generator().manual_seed(1), dtype=torch.float64)
-    grads = torch.autograd.grad((image * weights.to(dtype)).sum(), leaves)
-    return image.detach().double(), [
-        (name, grad.double()) for (name, _), grad in zip(named, grads, strict=True)
-    ]
-
-
 def assert_same_function(scene, size, channels=4):
-    image, grads = outcome(reference.composite, scene, size, torch.float64, channels)
-    fast = lambda tensors, width, height: fused.composite(tensors, width, height, channels)  # noqa: E731
-    fast_image, fast_grads = outcome(fast, scene, size, torch.float32, channels)
-    assert float((image - fast_image).abs().max()) <= VALUES
-    largest: dict[str, float] = {}
-    for name, grad in grads:
-        largest[name] = max(largest.get(name, 0.1), float(grad.abs().max()))
-    for (name, grad), (_, fast_grad) in zip(grads, fast_grads, strict=True):
-        assert float((grad - fast_grad).abs().max()) <= GRADIENTS * largest[name], name
+    assert_near_the_reference(fused.composite, scene, from_scene(scene), size, channels)
 
 
 SIZES = st.sampled_from([(60, 40), (1, 1), (1, 37), (33, 17), (16, 16), (50, 71)])
@@ -104,7 +80,7 @@ def test_the_number_of_threads_changes_nothing(monkeypatch):
     results = []
     for count in ("1", "2", "3"):
         monkeypatch.setenv("SDF2VEC_THREADS", count)
-        image, grads = outcome(fused.composite, scene, (90, 70), torch.float32)
+        image, grads = outcome(fused.composite, from_scene(scene), (90, 70))
         results.append([image, *(grad for _, grad in grads)])
     for other in results[1:]:
         assert all(torch.equal(a, b) for a, b in zip(results[0], other, strict=True))

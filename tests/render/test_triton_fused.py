@@ -12,8 +12,9 @@ import torch
 from sdf2vec import Layer, Scene, Shape, kernel_cache
 from sdf2vec.blend import COMPOSITING
 from sdf2vec.layer import Part
-from sdf2vec.render import fused, reference, triton_fused, triton_kernels
+from sdf2vec.render import fused, triton_fused, triton_kernels
 from sdf2vec.render.tensors import from_scene
+from tests.render.agreement import assert_near_the_reference, outcome
 from tests.scenes import FAMILIES, scene_of
 from tests.triton_device import DEVICE
 
@@ -21,8 +22,6 @@ pytestmark = [
     pytest.mark.filterwarnings("ignore::RuntimeWarning:triton"),  # the interpreter's 0.5 / 0, not selected
     pytest.mark.usefixtures("triton"),
 ]
-
-VALUES, GRADIENTS = 1e-4, 1e-3
 
 
 @pytest.fixture
@@ -33,37 +32,9 @@ def triton(require_engine):
 # --- whole scenes ------------------------------------------------------------------------------------------
 
 
-def outcome(composite, tensors, size):
-    """The image, and the derivatives of a fixed random sum of it, by the name of what each belongs to."""
-    named = [(slot.parameter.name, v) for group in tensors.groups for slot, v in group.values.items()]
-    named.append(("background", tensors.background))
-    leaves = [tensor.requires_grad_() for _, tensor in named]
-    image = composite(tensors, *size)
-    weights = torch.randn(image.shape, generator=torch.Generator().manual_seed(1), dtype=torch.float64)
-    grads = torch.autograd.grad((image * weights.to(image)).sum(), leaves)
-    return image.detach().cpu().double(), [
-        (name, grad.cpu().double()) for (name, _), grad in zip(named, grads, strict=True)
-    ]
-
-
-def on_device(scene, size, channels=4):
-    def composite(tensors, width, height):
-        return triton_fused.composite(tensors, width, height, channels)
-
-    return outcome(composite, from_scene(scene, device=DEVICE), size)
-
-
 def assert_same_function(scene, size, channels=4):
-    exact = from_scene(scene, torch.float64)
-    image, grads = outcome(lambda *arguments: reference.composite(*arguments)[:channels], exact, size)
-    fast_image, fast_grads = on_device(scene, size, channels)
-    assert fast_image.shape == (channels, size[1], size[0])
-    assert float((image - fast_image).abs().max()) <= VALUES
-    largest: dict[str, float] = {}
-    for name, grad in grads:
-        largest[name] = max(largest.get(name, 0.1), float(grad.abs().max()))
-    for (name, grad), (_, fast_grad) in zip(grads, fast_grads, strict=True):
-        assert float((grad - fast_grad).abs().max()) <= GRADIENTS * largest[name], name
+    tensors = from_scene(scene, device=DEVICE)
+    assert_near_the_reference(triton_fused.composite, scene, tensors, size, channels)
 
 
 @pytest.mark.parametrize("compositing", COMPOSITING)
@@ -119,7 +90,7 @@ def test_equal_input_gives_equal_output_also_in_chunks_of_tiles(monkeypatch):
     results = []
     for scratch in (triton_fused.SCRATCH, triton_fused.SCRATCH, 4 * 4096):
         monkeypatch.setattr(triton_fused, "SCRATCH", scratch)
-        image, grads = on_device(scene, (40, 30))
+        image, grads = outcome(triton_fused.composite, from_scene(scene, device=DEVICE), (40, 30))
         results.append([image, *(grad for _, grad in grads)])
     for other in results[1:]:
         assert all(torch.equal(a, b) for a, b in zip(results[0], other, strict=True))
