@@ -2,6 +2,7 @@
 
 import gzip
 import random
+from functools import cache
 from typing import Any
 from xml.etree import ElementTree
 
@@ -10,6 +11,7 @@ import pytest
 
 from sdf2vec import Layer, Scene, Sdf2vecError, Shape
 from sdf2vec.engines import ENGINES
+from sdf2vec.export import svg as svg_module
 from sdf2vec.export.options import Options
 from sdf2vec.export.svg import smallest
 from sdf2vec.export.svg import svg as write_svg
@@ -42,6 +44,22 @@ def test_the_smallest_drawing_says_a_triangle_in_few_bytes():
     assert len(gzip.compress(text.encode(), 9)) <= 4720
 
 
+@pytest.fixture
+def drawn_once(monkeypatch):
+    """A drawing follows from scene and detail: it is made once, however many limits it is held against."""
+    made, text = {}, svg_module._text
+
+    def once(planner, detail, options):
+        key = (planner.scene, planner.filters, detail, options.title)
+        if key not in made:
+            made[key] = text(planner, detail, options)
+        return made[key]
+
+    monkeypatch.setattr(svg_module, "_text", once)
+    monkeypatch.setattr(svg_module, "_planner", cache(svg_module._planner))
+
+
+@pytest.mark.usefixtures("drawn_once")
 @pytest.mark.parametrize("softest", [0.0, 0.15])
 def test_a_tighter_limit_takes_no_more_from_the_picture_than_it_must(softest, require_engine):
     """From drawing to drawing, each a byte too large for the next limit: smaller and less near, by few dB a step."""
