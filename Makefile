@@ -7,10 +7,12 @@
 #   TORCH   what pip installs first; `make TORCH=torch demo` takes the newest PyTorch. Which build that is
 #           (CPU, CUDA, ROCm) depends on where pip looks: set PIP_INDEX_URL or PIP_FIND_LINKS for another.
 #           Read once, when .venv is made: `make distclean` first to change it.
+#   WORKERS how many processes share the tests: one for each core (auto), or 0 for none but pytest's own
 
 PYTHON ?= python3
 VENV ?= .venv
 TORCH ?= torch==2.13.0
+WORKERS ?= auto
 
 BIN := $(VENV)/bin
 PIP := $(BIN)/python -m pip --disable-pip-version-check
@@ -26,7 +28,7 @@ demo: $(VENV)/.installed
 	$(BIN)/sdf2vec examples/coffee.png --shapes 64 --seed 0 --emit json,glsl,shadertoy,wgsl,svg,png -o out/demo
 
 test: engines $(VENV)/.installed-clients lint
-	$(BIN)/python -m pytest
+	$(BIN)/python -m pytest -n $(WORKERS) --dist worksteal
 
 lint: $(VENV)/.installed-test
 	$(BIN)/ruff check

@@ -9,24 +9,8 @@ import math
 from collections.abc import Callable
 from dataclasses import dataclass
 
-from .expr import (
-    Expr,
-    Function,
-    absolute,
-    clamp,
-    const,
-    exp,
-    function,
-    let,
-    log,
-    maximum,
-    minimum,
-    mix,
-    select,
-    sigmoid,
-    sin,
-    vec4,
-)
+from .expr import Expr, absolute, clamp, const, exp, log, maximum, minimum, mix, select, sigmoid, sin, vec4
+from .function import Function, function, let
 from .operation import FLOAT, VEC2, VEC3, VEC4
 
 # --- falloff ------------------------------------------------------------------------------------------------

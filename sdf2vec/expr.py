@@ -14,11 +14,11 @@ that keep NaN away (a square root at zero, ties of `min`) are made in its rows a
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Hashable
-from dataclasses import dataclass
+from collections.abc import Hashable
 from functools import partial
 from weakref import WeakValueDictionary
 
+from .folding import SIMPLER
 from .operation import (
     CALL,
     FLOAT,
@@ -136,41 +136,6 @@ def constant(expr: Expr) -> float:
 def var(name: str, type: Type = FLOAT) -> Expr:
     """A named input."""
     return node("var", (), type, name)
-
-
-def let(name: str, value: Expr) -> Expr:
-    """`value`, which shader text shall compute as a local variable of this name."""
-    return node("let", (value,), value.type, name)
-
-
-# --- functions ----------------------------------------------------------------------------------------------
-
-
-@dataclass(frozen=True, eq=False)
-class Function:
-    """A formula with a name: shader text defines and calls it, other targets see through the call."""
-
-    name: str
-    parameters: tuple[Expr, ...]
-    body: Expr
-    doc: str
-
-    def __call__(self, *args: Operand) -> Expr:
-        given = tuple(_expr(arg) for arg in args)
-        expected = [parameter.type for parameter in self.parameters]
-        if [arg.type for arg in given] != expected:
-            raise TypeError(f"{self.name} takes {expected}, got {[arg.type for arg in given]}")
-        return node("call", given, self.body.type, self)
-
-
-def function(name: str, **types: Type) -> Callable[[Callable[..., Expr]], Function]:
-    """Decorator: a Python function of expressions becomes a `Function`, its docstring a comment."""
-
-    def decorate(formula: Callable[..., Expr]) -> Function:
-        parameters = tuple(var(parameter, type) for parameter, type in types.items())
-        return Function(name, parameters, formula(*parameters), (formula.__doc__ or "").strip())
-
-    return decorate
 
 
 # --- the table of operations --------------------------------------------------------------------------------
@@ -407,82 +372,30 @@ OPERATIONS: dict[str, Operation] = {
 }
 
 
-def _expr(value: Operand) -> Expr:
+def expression_of(value: Operand) -> Expr:
+    """A number as a constant."""
     return value if isinstance(value, Expr) else const(value)
 
 
 def operation(op: str, *args: Operand) -> Expr:
     """The node of a table row, folded where that is trivial. Raises TypeError when the types do not fit."""
     row = OPERATIONS[op]
-    given = tuple(_expr(arg) for arg in args)
+    given = tuple(expression_of(arg) for arg in args)
     type = row.result([arg.type for arg in given])
     if row.value and type is FLOAT and all(arg.op == "const" for arg in given):
         return const(row.value(*(constant(arg) for arg in given)))
-    simple = _SIMPLIFY[op](*given) if op in _SIMPLIFY else None
+    simple = SIMPLER[op](*given) if op in SIMPLER else None
     return simple if simple is not None and simple.type is type else node(op, given, type)
-
-
-def _is(expr: Expr, value: float) -> bool:
-    return expr.op == "const" and expr.payload == value
-
-
-def _simple_add(a: Expr, b: Expr) -> Expr | None:
-    return b if _is(a, 0.0) else a if _is(b, 0.0) else None
-
-
-def _simple_sub(a: Expr, b: Expr) -> Expr | None:
-    return a if _is(b, 0.0) else -b if _is(a, 0.0) else None
-
-
-def _simple_mul(a: Expr, b: Expr) -> Expr | None:
-    for one, other in ((a, b), (b, a)):
-        if _is(one, 0.0):
-            return one
-        if _is(one, 1.0):
-            return other
-        if _is(one, -1.0):
-            return -other
-    return None
-
-
-def _simple_div(a: Expr, b: Expr) -> Expr | None:
-    return a if _is(b, 1.0) or _is(a, 0.0) else None
-
-
-def _simple_neg(a: Expr) -> Expr | None:
-    return a.args[0] if a.op == "neg" else None
-
-
-def _simple_select(condition: Expr, a: Expr, b: Expr) -> Expr | None:
-    if condition.op == "less" and all(arg.op == "const" for arg in condition.args):
-        left, right = map(constant, condition.args)
-        return a if left < right else b
-    return a if a is b else None
-
-
-_SIMPLIFY: dict[str, Callable[..., Expr | None]] = {
-    "add": _simple_add,
-    "sub": _simple_sub,
-    "mul": _simple_mul,
-    "div": _simple_div,
-    "neg": _simple_neg,
-    "select": _simple_select,
-}
 
 
 # --- constructors by name -----------------------------------------------------------------------------------
 
 
-def _splat(value: Operand, width: int) -> Expr:
-    """`value` as a vector of `width` equal components, when it is a float and a vector is wanted."""
-    expr = _expr(value)
-    return operation(f"vec{width}", expr) if width > 1 and expr.type is FLOAT else expr
-
-
 def _broadcast(op: str, *args: Operand) -> Expr:
-    """For rows whose shader spelling wants equal types: floats become vectors first."""
-    width = max(_expr(arg).type.width for arg in args)
-    return operation(op, *(_splat(arg, width) for arg in args))
+    """For rows whose shader spelling wants equal types: floats become vectors of equal components first."""
+    given = [expression_of(arg) for arg in args]
+    width = max(arg.type.width for arg in given)
+    return operation(op, *(operation(f"vec{width}", arg) if arg.type.width < width else arg for arg in given))
 
 
 def minimum(a: Operand, b: Operand) -> Expr:

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Callable, Container, Iterable, Iterator, Mapping, Sequence
 
-from .expr import OPERATIONS, Expr, Function, component, const, operation, var
+from .expr import OPERATIONS, Expr, component, const, operation, var
 from .expr import node as made
+from .function import Function
 from .operation import COMPONENTS
 
 # --- walking ------------------------------------------------------------------------------------------------

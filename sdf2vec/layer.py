@@ -11,13 +11,15 @@ fused renderers, shader texts, records and lists of layers, and what samples lay
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cache, cached_property
 from typing import NamedTuple
 
 from .blend import COMPOSITING, JOINS, coverage, reach, saturation, union_reach
-from .expr import Expr, Operand, const, let, maximum, minimum, var, vec3, vec4
+from .expr import Expr, Operand, const, maximum, minimum, var, vec3, vec4
+from .function import let
 from .graph import scalarize
 from .operation import VEC2
 from .paints import FLAT, PAINTS, Paint
@@ -28,6 +30,7 @@ ROW_OPACITY = 1  # place of the opacity among `Formula.uniforms`
 NEVER = 1e9  # scene units: a distance that is never met
 LOOK = (Parameter("opacity", OPACITY, (1.0,)), Parameter("falloff", FALLOFF))
 JOIN = Parameter("smoothness", SMOOTHNESS)
+WORDS = ("kind", "paint", "join", "shapes")  # what a scene file says of a shape or a layer besides numbers
 STILL = const(0.0)
 P, PIXEL = var("p", VEC2), var("pixel")
 
@@ -41,15 +44,28 @@ class Part(NamedTuple):
 
     @property
     def parameters(self) -> tuple[Parameter, ...]:
-        """All of its numbers, in the order of a layer's row."""
+        """All of its numbers, in the order of a layer's row. Raises ValueError for a name that means two of them."""
         joined = (JOIN,) if self.join else ()
-        painted = PAINTS[self.paint].parameters if self.adds else ()
+        painted = _named_apart(KINDS[self.kind], PAINTS[self.paint]) if self.adds else ()
         return (*joined, *painted, *KINDS[self.kind].parameters)
 
     @property
     def adds(self) -> bool:
         """Whether it may make the layer larger, and its colour is seen."""
         return not self.join or JOINS[self.join].adds
+
+
+@cache
+def _named_apart(kind: Kind, paint: Paint) -> tuple[Parameter, ...]:
+    """The parameters of a paint, which no parameter of the kind it is put on shares a name with, nor a layer's."""
+    words = [*WORDS, *(parameter.name for parameter in (*LOOK, JOIN, *paint.parameters, *kind.parameters))]
+    twice = [name for name, count in Counter(words).items() if count > 1]
+    if twice:
+        raise ValueError(
+            f"the kind {kind.name} with the paint {paint.name}: two things are called {', '.join(twice)}; "
+            "scene files tell them apart by name"
+        )
+    return paint.parameters
 
 
 Structure = tuple[Part, ...]  # of a layer: all that decides its formula

@@ -10,7 +10,8 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import NamedTuple
 
-from .expr import Expr, clamp, dot, function, mix
+from .expr import Expr, clamp, dot, mix
+from .function import function
 from .operation import VEC2, VEC3
 from .units import COLOR, DIRECTION, Parameter
 
@@ -23,7 +24,7 @@ class Ramp(NamedTuple):
     last: tuple[float, float, float]
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Paint:
     """`color(q, color, *own)` is the colour (vec3) at a point q of the shape's frame, in which the shape reaches from
     about −1 to 1 along both axes. `own` are the parameters after `color`. `ramp(color, *own)` is for vector formats: a

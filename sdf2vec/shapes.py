@@ -21,9 +21,7 @@ from .expr import (
     dot,
     exp,
     fixed,
-    function,
     length,
-    let,
     maximum,
     minimum,
     select,
@@ -32,6 +30,7 @@ from .expr import (
     vec2,
     vec4,
 )
+from .function import function, let
 from .operation import FLOAT, VEC2
 from .outlines import EllipseOutline, Outline, Point, PolygonOutline, RectangleOutline
 from .units import ANGLE, FREQUENCY, LENGTH, POSITION, Parameter
@@ -80,7 +79,7 @@ def _upright_frame(extent: Callable[..., Expr], *parameters: Expr) -> Frame:
     return Frame((low + high) * 0.5, vec2(1.0, 0.0), (high - low) * 0.5)
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Kind:
     """A kind of shape.
 

@@ -10,7 +10,8 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, NamedTuple
 
-from .expr import Expr, const, function, length, let, operation, var
+from .expr import Expr, const, length, operation, var
+from .function import function, let
 from .graph import components_of
 from .operation import FLOAT, VECTOR, Type
 

@@ -1,13 +1,21 @@
-"""Fixtures that all tests share."""
+"""Fixtures that all tests share; one thread for each of several processes that share the tests."""
 
 import os
 from collections.abc import Callable
+from importlib.util import find_spec
 
 import pytest
 
 from sdf2vec.engines import ENGINES, glslang
 
-MISSING = {name: engine.missing for name, engine in ENGINES.items()} | {"glslang": glslang.missing}
+if "PYTEST_XDIST_WORKER" in os.environ:  # torch reads it when it is loaded, after this
+    for name in ("OMP_NUM_THREADS", "SDF2VEC_THREADS"):
+        os.environ.setdefault(name, "1")
+
+MISSING = {name: engine.missing for name, engine in ENGINES.items()} | {
+    "glslang": glslang.missing,
+    "triton": lambda: None if find_spec("triton") else "not installed",
+}
 
 
 @pytest.fixture

@@ -17,8 +17,7 @@ from sdf2vec.export import EXPORTERS
 from sdf2vec.fit.presets import PRESETS
 from sdf2vec.fit.settings import LOSS_NAMES, kinds_of, losses_of, settings_of
 from sdf2vec.image import load
-
-from .scenes import SOFT
+from tests.scenes import SOFT
 
 if TYPE_CHECKING:
     from sdf2vec.fit.loop import Progress

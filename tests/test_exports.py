@@ -15,8 +15,7 @@ from sdf2vec.fit import conversion
 from sdf2vec.fit.presets import PRESETS
 from sdf2vec.metrics import psnr
 from sdf2vec.render.draw import draw
-
-from .scenes import random_scene
+from tests.scenes import random_scene
 
 OVER = random_scene(("circle",), layers=2, seed=3)
 ADDITIVE = random_scene(("circle",), "additive", layers=2, seed=3)
@@ -25,13 +24,13 @@ TRANSPARENT = replace(ADDITIVE, background=None)
 
 @pytest.fixture
 def toy(monkeypatch):
-    """Counts shapes, on a ground or under `over` only; with a file beside it."""
+    """Counts shapes, under any compositing or under `over` only; with a file beside it."""
 
     def count(scene: Scene, options: Options) -> Exported:
         text = f"{options.title}: {scene.shape_count} {scene.compositing}"
         return Exported(text, {".toy.bin": b"\1\2"}, ("counted",), 0.5)
 
-    accepts = {"filters": Accepts(additive_needs_ground=True), "portable": Accepts(("over",))}
+    accepts = {"filters": Accepts(), "portable": Accepts(("over",))}
     exporter = Exporter(".toy.txt", count, "how many", lambda options: accepts[options.svg_profile])
     monkeypatch.setitem(EXPORTERS, "toy", exporter)
 
@@ -75,7 +74,7 @@ def test_a_toy_target(tmp_path, capsys):
         (OVER, "portable", ""),
         (replace(OVER, background=None), "filters", ""),
         (ADDITIVE, "filters", ""),
-        (TRANSPARENT, "filters", "on a transparent ground"),
+        (TRANSPARENT, "filters", ""),
         (ADDITIVE, "portable", "without blend modes"),
         (TRANSPARENT, "portable", "without blend modes"),
     ],
@@ -91,7 +90,8 @@ def test_what_is_not_accepted_is_converted(scene, profile, why, converted):
 @pytest.mark.usefixtures("toy")
 def test_several_exports_convert_once(converted):
     several = Exports(TRANSPARENT)
-    assert {several.export(target).data for target in ("toy", "toy")} == {"a picture: 2 over"}
+    portable = Options(svg_profile="portable")
+    assert {several.export(target, portable).data for target in ("toy", "toy")} == {"a picture: 2 over"}
     assert converted == [TRANSPARENT]
 
 

@@ -12,9 +12,7 @@ from sdf2vec.expr import (
     const,
     constant,
     fixed,
-    function,
     length,
-    let,
     maximum,
     mix,
     operation,
@@ -23,11 +21,11 @@ from sdf2vec.expr import (
     var,
     vec2,
 )
+from sdf2vec.function import function, let
 from sdf2vec.graph import gradient, hoist, scalarize, substitute, walk
 from sdf2vec.lower.torch import compile_torch
 from sdf2vec.operation import BOOL, FLOAT, VEC2, VEC3
-
-from .operations import MEANINGS, SMOOTH, expected
+from tests.operations import MEANINGS, SMOOTH, expected
 
 a, b, p = var("a"), var("b"), var("p", VEC2)
 ARGUMENTS = [var(name) for name in ("x0", "x1", "x2", "x3", "x4")]

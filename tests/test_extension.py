@@ -1,12 +1,9 @@
 """A kind, a paint and a join that only this module knows, in every renderer and every export of a scene."""
 
 import json
-import os
 import random
 from collections import Counter
 from dataclasses import replace
-from importlib import import_module
-from importlib.util import find_spec
 
 import numpy as np
 import pytest
@@ -19,25 +16,12 @@ from sdf2vec.engines import chromium
 from sdf2vec.engines.pages import ELEMENT
 from sdf2vec.export import EXPORTERS, Exporter, packing
 from sdf2vec.export.options import SVG_PROFILES, Options
-from sdf2vec.expr import (
-    Expr,
-    absolute,
-    cos,
-    dot,
-    function,
-    length,
-    maximum,
-    minimum,
-    mix,
-    select,
-    sin,
-    vec2,
-    vec4,
-)
+from sdf2vec.expr import Expr, absolute, cos, dot, length, maximum, minimum, mix, select, sin, vec2, vec4
 from sdf2vec.fit.constraints import project
 from sdf2vec.fit.initialization import Layers, place
 from sdf2vec.fit.loop import adam
 from sdf2vec.fit.presets import Start
+from sdf2vec.function import function
 from sdf2vec.layer import Part
 from sdf2vec.operation import FLOAT, VEC4
 from sdf2vec.paints import PAINTS, Paint
@@ -47,16 +31,8 @@ from sdf2vec.roundtrip import ROUND_TRIPS, compare
 from sdf2vec.scene import Joint
 from sdf2vec.shapes import KINDS, Kind, rotate
 from sdf2vec.units import ANGLE, COLOR, FREQUENCY, LENGTH, POSITION, Parameter
-
-from . import conftest
-from .test_component import assert_shows, module
-
-if not torch.cuda.is_available():  # before anything imports Triton
-    os.environ.setdefault("TRITON_INTERPRET", "1")
-if find_spec("triton"):
-    import_module("triton")  # now: its LLVM does not load after that of a software OpenGL driver
-DEVICE = "cuda" if torch.cuda.is_available() else "cpu"
-conftest.MISSING["triton"] = lambda: None if find_spec("triton") else "not installed"
+from tests.export.test_component import assert_shows, module
+from tests.triton_device import DEVICE
 
 # --- a disc squeezed and waved: nine numbers -----------------------------------------------------------------
 

@@ -1,6 +1,7 @@
 """The formula of a layer against one written a second time in numpy, and its bounds and derivatives."""
 
 import random
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -12,11 +13,13 @@ from sdf2vec.blend import COMPOSITING
 from sdf2vec.graph import components_of
 from sdf2vec.layer import PIXEL, Formula, P, Part, constant_row, is_flat, row_width, slots
 from sdf2vec.lower.torch import compile_torch
+from sdf2vec.paints import PAINTS, Paint
 from sdf2vec.render.reference import composite, render
 from sdf2vec.render.tensors import from_scene
 from sdf2vec.scene_file import loads
-
-from .scenes import FAMILIES, random_layer_of, scene_of
+from sdf2vec.shapes import KINDS
+from sdf2vec.units import ANGLE, Parameter
+from tests.scenes import FAMILIES, random_layer_of, scene_of
 
 STRUCTURES = [structure for structures in FAMILIES.values() for structure in structures]
 NAMES = [str(Formula.of(structure)) for structure in STRUCTURES]
@@ -62,6 +65,22 @@ def test_a_row_has_a_place_for_every_number():
         *("smoothness_2", "color_2", "center_2", "radii_2", "angle_2", "frequency_2", "phase_2"),
     ]
     assert row_width(structure) == 2 + 8 + 3 + 1 + 6 + 1 + 3 + 7
+
+
+@pytest.mark.parametrize(
+    ("kind", "paint", "word"),
+    [("angle", "direction", ""), ("angle", "angle", "angle"), ("falloff", "direction", "falloff")],
+)
+def test_a_name_means_one_thing(kind, paint, word, monkeypatch):
+    """A file tells the numbers of a shape apart by name, so none of kind, paint and layer may share one."""
+    named = replace(KINDS["circle"], name="toy", parameters=(Parameter(kind, ANGLE),))
+    monkeypatch.setitem(KINDS, "toy", named)
+    monkeypatch.setitem(PAINTS, "veil", Paint("veil", PAINTS["flat"].color, (Parameter(paint, ANGLE),)))
+    if not word:
+        assert [p.name for p in Part("toy", "veil").parameters] == ["color", "direction", "angle"]
+        return
+    with pytest.raises(ValueError, match=f"kind toy with the paint veil: two things are called {word};"):
+        slots((Part("toy", "veil"),))
 
 
 def test_the_colour_of_what_is_cut_off_has_no_place():

@@ -23,7 +23,7 @@ REMARKS = re.compile(r'//[^\n]*|(?<!\w)#(?!version)[^\n]*|""".*?"""|"[^"\n]*"|<s
 WORKS = r"(?:\*\*|[-+*/])=?"
 # Names of colours, coverages, distances and points of the scene; those of one letter mean so in shaders only.
 SHARED = r"[prq]\d|p|d|below\d?|belows|cover|color|opacity|falloff|smoothness|outer|inner|corner|box|fragColor|COLOR"
-NAMES = {"tiles.py.jinja": SHARED, "tiles.triton.jinja": SHARED}
+NAMES = dict.fromkeys(("measures.py.jinja", "tiles.py.jinja", "tiles.triton.jinja"), SHARED)
 IN_SHADERS = rf"c|s|o|v|g|{SHARED}"
 FORMULAS = r"\b(?:mix|exp2?|log2?|(?<!Math\.)sqrt|pow|smoothstep|sigmoid|tanh|dot|length|normalize)\s*\("
 

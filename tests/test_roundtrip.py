@@ -13,8 +13,7 @@ from sdf2vec.export.exported import Exported
 from sdf2vec.lower.shader import literal
 from sdf2vec.roundtrip import ROUND_TRIPS, compare
 from sdf2vec.shapes import KINDS
-
-from .scenes import SOFT, random_scene
+from tests.scenes import SOFT, random_scene
 
 SIZES = [(60, 40), (133, 71), (9, 6)]  # the fitted one, one larger and of another shape, a tiny one
 LARGEST, MEAN = 0.25, 0.05  # levels of 255

@@ -136,7 +136,8 @@ def rows(scenes: dict[int, Scene]) -> Iterator[str]:
 def _rows_of(scene: Scene, target: str, layout: str) -> Iterator[str]:
     made = shader(scene, target, Options(layout=layout))
     size = len(made.text) + (0 if made.data is None else made.data.nbytes)
-    depth = made.choice.depth
+    tiles = made.choice.tiles
+    depth = tiles.depth if tiles else float(len(scene.layers))
     for engine in ENGINES[target]:
         head = f"| {target} | {layout} | {scene.shape_count} | {depth:.1f} | {size:,} | {engine} |"
         found = in_time(scene, target, layout, engine)

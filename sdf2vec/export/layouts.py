@@ -15,7 +15,7 @@ differences show; on a GPU all is faster and the order is the same.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import lru_cache
+from functools import cached_property
 
 from ..errors import Sdf2vecError
 from ..scene import Scene
@@ -78,31 +78,37 @@ OLD = Host(("readable",), 100_000.0)  # GLSL ES 1.00 has neither constant arrays
 
 @dataclass(frozen=True)
 class Choice:
-    """A layout with its estimated costs; `across` is how many cells the shortest side has, 0 without a grid."""
+    """A layout with its estimated costs, and with its lists for cells, if it has any."""
 
     layout: str
-    across: int
-    depth: float  # layers that a pixel evaluates
+    tiles: Tiles | None
     text: int  # bytes
     compile: float  # seconds
     frame: float  # seconds
 
     def __str__(self) -> str:
-        grid = f" ({self.across} cells across, {self.depth:.1f} layers each)" if self.across else ""
-        return f"layout {self.layout}{grid}"
+        if self.tiles is None:
+            return f"layout {self.layout}"
+        across, depth = round(self.tiles.grid.per_unit), self.tiles.depth
+        return f"layout {self.layout} ({across} cells across, {depth:.1f} layers each)"
 
 
-def choose(scene: Scene, wanted: str, host: Host) -> Choice:
-    """The layout that is wanted, or for "auto" the cheapest one. Raises Sdf2vecError if the host can't take it."""
+def choose(scene: Scene, wanted: str, host: Host, slack: float = 0.0) -> Choice:
+    """The layout that is wanted, or for "auto" the cheapest one. Raises Sdf2vecError if the host can't take it.
+
+    Its lists leave room for edges to move by `slack`, in scene units.
+    """
     possible = [layout for layout in host.layouts if layout not in CONSTANT or fits_constants(scene)]
-    if wanted != "auto":
-        if wanted not in host.layouts:
-            raise Sdf2vecError(f"layout {wanted} is not possible here; choose from {', '.join(host.layouts)}")
-        if wanted not in possible:
-            raise Sdf2vecError(f"layout {wanted}: too many shapes for a constant table; use {possible[-1]}")
-        return estimate(scene, wanted, host)
-    found = [estimate(scene, layout, host) for layout in possible]
-    return min(found, key=lambda choice: _score(choice, host))
+    if wanted == "auto":
+        considered = possible
+    elif wanted not in host.layouts:
+        raise Sdf2vecError(f"layout {wanted} is not possible here; choose from {', '.join(host.layouts)}")
+    elif wanted not in possible:
+        raise Sdf2vecError(f"layout {wanted}: too many shapes for a constant table; use {possible[-1]}")
+    else:
+        considered = [wanted]
+    costs = _Costs(scene, host, slack)
+    return min(map(costs.of, considered), key=lambda choice: _score(choice, host))
 
 
 def fits_constants(scene: Scene) -> bool:
@@ -117,51 +123,53 @@ def _score(choice: Choice, host: Host) -> float:
     return seconds * (10.0 if choice.text > TEXT_LIMIT else 1.0)
 
 
-@lru_cache(maxsize=64)
-def estimate(scene: Scene, layout: str, host: Host) -> Choice:
-    """What a layout will cost."""
-    cost, layers = COSTS[layout], len(scene.layers)
-    across, depth, text = _size(scene, layout, host)
-    compile_seconds = cost.compile + cost.compile_shape * scene.shape_count
-    shapes = depth * scene.shape_count / max(1, layers)
-    return Choice(layout, across, depth, text, compile_seconds, cost.frame + cost.frame_shape * shapes)
+@dataclass(frozen=True)
+class _Costs:
+    """What layouts of a scene will cost."""
 
+    scene: Scene
+    host: Host
+    slack: float
 
-def _size(scene: Scene, layout: str, host: Host) -> tuple[int, float, int]:
-    """Cells across, layers that a pixel evaluates, bytes of text."""
-    layers, shapes = len(scene.layers), scene.shape_count
-    table = int(2500 + shapes * form_of(scene).stride * 4 * NUMBER)
-    if layout in ("readable", "table"):
-        return 0, float(layers), {"readable": 2500 + 105 * shapes, "table": table}[layout]
-    if layout == "packed":
-        return 0, float(layers), 3500 + 46 * shapes
-    tiles = best_data_tiles(scene) if layout == "data" else best_tiles(scene, host.bytes_a_second)
-    lists = 0 if layout == "data" else list_bytes(tiles)
-    across = round(tiles.grid.per_unit)
-    return across, tiles.depth, 3000 if layout == "data" else table + lists
+    def of(self, layout: str) -> Choice:
+        """What one layout will cost."""
+        cost, shapes = COSTS[layout], self.scene.shape_count
+        tiles = self.tiles(layout)
+        evaluated = shapes if tiles is None else tiles.depth * shapes / max(1, len(self.scene.layers))
+        seconds = cost.compile + cost.compile_shape * shapes
+        return Choice(
+            layout, tiles, self.text(layout, tiles), seconds, cost.frame + cost.frame_shape * evaluated
+        )
 
+    def text(self, layout: str, tiles: Tiles | None) -> int:
+        """Bytes of text."""
+        shapes = self.scene.shape_count
+        fixed, each = {"readable": (2500, 105), "packed": (3500, 46), "data": (3000, 0)}.get(
+            layout, (2500, form_of(self.scene).stride * 4 * NUMBER)
+        )
+        return int(fixed + shapes * each) + (list_bytes(tiles) if tiles and layout == "tiled" else 0)
 
-@lru_cache(maxsize=64)
-def best_tiles(scene: Scene, bytes_a_second: float, slack: float = 0.0) -> Tiles:
-    """The grid at which short lists and little text balance: that has to be read, and compiled."""
-    weight = FRAMES * COSTS["tiled"].frame_shape
-    bytes_a_second = 1.0 / (1.0 / bytes_a_second + 1.0 / LIST_BYTES_A_SECOND)
-    return min(
-        _candidates(scene, slack), key=lambda tiles: weight * tiles.depth + list_bytes(tiles) / bytes_a_second
-    )
+    def tiles(self, layout: str) -> Tiles | None:
+        """The grid at which short lists and little text balance: that has to be read, and compiled.
 
+        Lists that are data are as fine as it pays.
+        """
+        if layout == "data":
+            return min(self.candidates, key=lambda tiles: tiles.depth + len(tiles.entries) * 1e-4)
+        if layout != "tiled":
+            return None
+        weight = FRAMES * COSTS["tiled"].frame_shape
+        seconds_a_byte = 1.0 / self.host.bytes_a_second + 1.0 / LIST_BYTES_A_SECOND
+        return min(
+            self.candidates, key=lambda tiles: weight * tiles.depth + list_bytes(tiles) * seconds_a_byte
+        )
 
-@lru_cache(maxsize=64)
-def best_data_tiles(scene: Scene, slack: float = 0.0) -> Tiles:
-    """The grid for lists that are data: as fine as it pays."""
-    return min(_candidates(scene, slack), key=lambda tiles: tiles.depth + len(tiles.entries) * 1e-4)
-
-
-def _candidates(scene: Scene, slack: float) -> list[Tiles]:
-    grids = [scene_grid(scene, across) for across in CELLS_ACROSS]
-    return [bin_layers(scene, grid, slack) for grid in grids if grid.cells <= MOST_CELLS] or [
-        bin_layers(scene, Grid(1, 1, 1.0, grids[0].low), slack)
-    ]
+    @cached_property
+    def candidates(self) -> list[Tiles]:
+        """Lists for grids of more and more cells."""
+        grids = [scene_grid(self.scene, across) for across in CELLS_ACROSS]
+        few = [grid for grid in grids if grid.cells <= MOST_CELLS] or [Grid(1, 1, 1.0, grids[0].low)]
+        return bin_layers(self.scene, few, self.slack)
 
 
 def list_bytes(tiles: Tiles) -> int:

@@ -41,14 +41,10 @@ class Options(Struct, frozen=True, kw_only=True):
 
 @dataclass(frozen=True)
 class Accepts:
-    """Which scenes an exporter takes: of these compositings, additive ones perhaps on an opaque ground only."""
+    """Which scenes an exporter takes: of these compositings."""
 
     compositing: tuple[str, ...] = field(default_factory=lambda: tuple(COMPOSITING))
-    additive_needs_ground: bool = False
 
     def refusal(self, scene: Scene) -> str:
         """Why a scene is not taken; empty where it is."""
-        if scene.compositing not in self.compositing:
-            return "without blend modes"
-        transparent = scene.compositing == "additive" and scene.background is None
-        return "on a transparent ground" if transparent and self.additive_needs_ground else ""
+        return "" if scene.compositing in self.compositing else "without blend modes"

@@ -31,8 +31,6 @@ from .layouts import (
     WORD,
     Choice,
     Host,
-    best_data_tiles,
-    best_tiles,
     choose,
 )
 from .options import GLSL_VERSIONS, Options
@@ -96,8 +94,8 @@ def exported(scene: Scene, options: Options, name: str, suffix: str) -> Exported
 def shader(scene: Scene, name: str, options: Options) -> Shader:
     """A scene as a shader: `name` is a key of TARGETS. Raises Sdf2vecError for a layout that the target can't hold."""
     target = TARGETS[name]
-    choice = choose(scene, options.layout, _host(target, options))
     slack = BREATH if _moves(target, options) else 0.0
+    choice = choose(scene, options.layout, _host(target, options), slack)
     job = _Job(scene, target, options, choice, slack)
     parts = _BODIES[choice.layout if scene.layers else "readable"](job)
     data, error = parts.pop("array", None), parts.pop("error", 0.0)
@@ -159,6 +157,12 @@ class _Job:
     @property
     def dialect(self) -> Dialect:
         return self.target.dialect
+
+    @property
+    def tiles(self) -> Tiles:
+        """The lists of a layout that has some."""
+        assert self.choice.tiles is not None
+        return self.choice.tiles
 
     def motion(self, index: Expr) -> Expr:
         """What is added to the distance of the layer whose first shape has an index."""
@@ -228,7 +232,7 @@ def _table(job: _Job) -> dict[str, Any]:
 
 
 def _tiled(job: _Job) -> dict[str, Any]:
-    tiles = best_tiles(job.scene, job.target.host.bytes_a_second, job.slack)
+    tiles = job.tiles
     entries = first_records(job.scene.layers)[tiles.entries]
     bits = max(1, int(entries.max(initial=0)).bit_length())
     per = WORD // bits
@@ -248,7 +252,7 @@ def words_of(numbers: Sequence[int], bits: int, per: int) -> list[int]:
 
 
 def _data(job: _Job) -> dict[str, Any]:
-    tiles, form = best_data_tiles(job.scene, job.slack), form_of(job.scene)
+    tiles, form = job.tiles, form_of(job.scene)
     rows = records(job.scene, form).reshape(-1, 4)
     numbers = np.concatenate([tiles.starts, first_records(job.scene.layers)[tiles.entries]])
     array = data_array(rows, numbers)

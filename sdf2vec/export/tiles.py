@@ -8,7 +8,7 @@ Cells at the border go on for ever outwards: the lists hold on a canvas of any s
 from __future__ import annotations
 
 from collections import defaultdict
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from functools import cache
 from typing import Any
@@ -100,14 +100,19 @@ def scene_grid(scene: Scene, across: int) -> Grid:
     return Grid(columns, rows, float(across), (-0.5 * width, -0.5 * height))
 
 
-def bin_layers(scene: Scene, grid: Grid, slack: float = 0.0) -> Tiles:
-    """The layers that each cell needs; `slack` is how far edges may move, in scene units.
+def bin_layers(scene: Scene, grids: Sequence[Grid], slack: float = 0.0) -> list[Tiles]:
+    """The layers that each cell of each grid needs; `slack` is how far edges may move, in scene units.
 
     Layers below one that hides them in the whole of a cell are left out there.
     """
     if not scene.layers:
-        return Tiles(grid, np.zeros(grid.cells + 1, np.int64), np.zeros(0, np.int64))
-    bounds, regions = layer_bounds(scene, slack), grid.regions()
+        return [Tiles(grid, np.zeros(grid.cells + 1, np.int64), np.zeros(0, np.int64)) for grid in grids]
+    bounds = layer_bounds(scene, slack)
+    return [_binned(scene, grid, bounds) for grid in grids]
+
+
+def _binned(scene: Scene, grid: Grid, bounds: Bounds) -> Tiles:
+    regions = grid.regions()
     layers, cells = np.nonzero(_overlap(bounds.boxes, regions))  # by layer, so in draw order within each cell
     bounded: BoolArray = np.all(np.isfinite(regions), axis=1)[cells]
     leaves: BoolArray = np.any(bounds.boxes[:, :2] < np.array(grid.low), axis=1) | np.any(

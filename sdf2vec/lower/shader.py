@@ -12,7 +12,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..expr import OPERATIONS, Expr, Function, constant
+from ..expr import OPERATIONS, Expr, constant
+from ..function import Function
 from ..graph import walk
 from ..operation import CALL, COMPONENTS, PRECEDENCE, Cell, Operation, Type
 

@@ -45,7 +45,9 @@ def _canvas(tensors: SceneTensors, width: int, height: int, channels: int) -> tu
     order = _draw_order(tensors)
     index = np.repeat(np.arange(len(structures)), list(map(len, tensors.groups)))[order.numpy()]
     hides = COMPOSITING[tensors.compositing].hides
-    canvas = _Canvas(module, index, channels, width, height, *axes, hides=hides)
+    canvas = _Canvas(
+        kernels.load_measures(structures), module, index, channels, width, height, *axes, hides=hides
+    )
     return canvas, rows_of(tensors.groups, float(axes[2]))[order]
 
 
@@ -93,6 +95,7 @@ def uniform_rows(group: Group, pixel: float) -> torch.Tensor:
 class _Canvas:
     """What a render needs besides the numbers of the scene."""
 
+    measures: ModuleType
     module: ModuleType
     kinds: IntArray  # [L]
     channels: int
@@ -129,7 +132,7 @@ def _bin(canvas: _Canvas, rows: Float32Array) -> Bins:
     centers = np.empty((most, 2), np.float32)
     pairs = tiling.list_candidates(bounds, ranges, *place, tiles, layers, spans, centers)
     distances = np.empty(pairs, np.float32)
-    canvas.module.measure_distances(canvas.kinds, rows, layers, centers, distances)
+    canvas.measures.measure_distances(canvas.kinds, rows, layers, centers, distances)
     pairs = tiling.keep_touching(pairs, distances, bounds, tiles, layers, spans)
     starts = np.zeros(canvas.columns * canvas.rows + 1, np.int64)
     sorted_layers, sorted_spans = np.empty(pairs, np.int32), np.empty((pairs, 2), np.int32)
@@ -140,7 +143,7 @@ def _bin(canvas: _Canvas, rows: Float32Array) -> Bins:
 def _bounds(canvas: _Canvas, rows: Float32Array) -> Float32Array:
     """The bounds of every layer [L, 6]: `kernels.culling`."""
     bounds = np.empty((len(canvas.kinds), tiling.INNER + 1), np.float32)
-    canvas.module.measure_bounds(canvas.kinds, rows, bounds)
+    canvas.measures.measure_bounds(canvas.kinds, rows, bounds)
     return bounds
 
 

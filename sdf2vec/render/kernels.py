@@ -67,7 +67,7 @@ def culling(formula: Formula) -> tuple[Expr, ...]:
 
 
 def text(structures: tuple[Structure, ...], compositing: str, channels: int) -> str:
-    """The whole module for layers of these structures and 3 or 4 channels of colour.
+    """The module that draws layers of these structures in 3 or 4 channels of colour.
 
     A layer's row of numbers is `Formula.uniforms`.
     """
@@ -77,8 +77,6 @@ def text(structures: tuple[Structure, ...], compositing: str, channels: int) -> 
         parts += [
             f"# {formula}",
             *_both_ways(drawn(formula, f"layer{index}", compositing, channels), channels),
-            scalar(f"bounds{index}", culling(formula), (), formula.uniforms),
-            scalar(f"distance{index}", scalarize(formula.distance), components_of(P), formula.uniforms),
         ]
     solid = solid_blocks(formulas, compositing, channels)
     for block in dict.fromkeys(block for block in solid if block):
@@ -88,14 +86,32 @@ def text(structures: tuple[Structure, ...], compositing: str, channels: int) -> 
     return "\n\n".join([*parts, driver])
 
 
+def measuring_text(structures: tuple[Structure, ...]) -> str:
+    """The module that says where layers of these structures are, whatever they are drawn in."""
+    parts = [PREAMBLE]
+    for index, formula in enumerate(map(Formula.of, structures)):
+        parts += [
+            f"# {formula}",
+            scalar(f"bounds{index}", culling(formula), (), formula.uniforms),
+            scalar(f"distance{index}", scalarize(formula.distance), components_of(P), formula.uniforms),
+        ]
+    return "\n\n".join([*parts, template("measures.py.jinja").render(kinds=len(structures))])
+
+
 def _both_ways(block: Block, channels: int) -> tuple[str, str]:
     return forward(block, carried(channels)), backward(block, carried(channels))
 
 
 @cache
 def load(structures: tuple[Structure, ...], compositing: str, channels: int) -> ModuleType:
-    """The compiled module for layers of these structures and 3 or 4 channels of colour."""
+    """The compiled module that draws layers of these structures in 3 or 4 channels of colour."""
     return kernel_cache.load(text(structures, compositing, channels))
+
+
+@cache
+def load_measures(structures: tuple[Structure, ...]) -> ModuleType:
+    """The compiled module that says where layers of these structures are."""
+    return kernel_cache.load(measuring_text(structures))
 
 
 def is_compiled(structures: tuple[Structure, ...], compositing: str, channels: int) -> bool:

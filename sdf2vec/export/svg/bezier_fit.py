@@ -27,12 +27,7 @@ def smooth_path(contours: Sequence[Points], tolerance: float, canvas: Canvas) ->
 def straight_path(contours: Sequence[Points], tolerance: float, canvas: Canvas) -> Path:
     """The same with straight lines: unlike curves', their pixels are the same in every path they are part of."""
     corners = [approximate_polygon(contour, tolerance)[:-1] for contour in contours]
-    return Path(tuple(_straight(canvas.rounded(points - ASIDE) + ASIDE) for points in corners))
-
-
-def _straight(corners: Points) -> Contour:
-    first, *rest = pairs(corners)
-    return Contour(first, tuple((corner,) for corner in rest))
+    return Path(tuple(Contour.straight(pairs(canvas.rounded(points - ASIDE) + ASIDE)) for points in corners))
 
 
 def _smooth(contour: Points, tolerance: float, canvas: Canvas) -> Contour:
@@ -40,7 +35,7 @@ def _smooth(contour: Points, tolerance: float, canvas: Canvas) -> Contour:
     points = np.concatenate([points, points[:1]])
     rough = approximate_polygon(points, 12 * tolerance)
     if len(rough) < 4:
-        return _straight(canvas.rounded(approximate_polygon(points, tolerance)[:-1]))
+        return Contour.straight(pairs(canvas.rounded(approximate_polygon(points, tolerance)[:-1])))
     curves: list[Points] = []
     for start, end in pairwise(_knots(points, rough)):
         curves += _spans(points, start, end, tolerance)

@@ -22,6 +22,12 @@ class Contour(NamedTuple):
     start: Point
     segments: tuple[Segment, ...]
 
+    @classmethod
+    def straight(cls, corners: Sequence[Point]) -> Contour:
+        """Straight lines from corner to corner."""
+        first, *rest = corners
+        return cls(first, tuple((corner,) for corner in rest))
+
 
 @dataclass(frozen=True)
 class Path:

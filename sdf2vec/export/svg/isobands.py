@@ -65,6 +65,11 @@ def isobands(field: Float64Array, levels: Sequence[float], grid: SampleGrid, can
     return [Band((i + 1) / len(levels), found) for i, found in enumerate(traced)]
 
 
+def cover_bands(cover: Float64Array, count: int, grid: SampleGrid, canvas: Canvas) -> list[Band]:
+    """The bands of a field of coverage [Y, X], so many and a core."""
+    return isobands(-cover, [-edge for edge in band_edges(count)], grid, canvas)
+
+
 def layer_contours(layer: Layer, falloffs: Sequence[float], canvas: Canvas) -> list[Band]:
     """The bands between contours of a layer, so many falloffs outside."""
     grid = trace_grid(layer, canvas)

@@ -20,8 +20,8 @@ from .isobands import (
     Band,
     band_count,
     band_edges,
+    cover_bands,
     edge_distance,
-    isobands,
     layer_contours,
     stacked,
     trace_grid,
@@ -121,8 +121,7 @@ class Painter:
         grid = trace_grid(layer, canvas)
         if grid is None:
             return None
-        levels = [-edge for edge in band_edges(self.plan.bands[index])]
-        bands = isobands(-covers(layer, grid, 1.0 / canvas.unit), levels, grid, canvas)
+        bands = cover_bands(covers(layer, grid, 1.0 / canvas.unit), self.plan.bands[index], grid, canvas)
         return self._stacked(layer, [(fill, bands)], TOLERANCE)
 
     def _stacked(

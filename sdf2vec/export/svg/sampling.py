@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from functools import cache
+from functools import cache, lru_cache
 from typing import NamedTuple
 
 import numpy as np
@@ -92,6 +92,7 @@ def _profile() -> Callable[..., tuple[torch.Tensor, ...]]:
 # --- a layer -----------------------------------------------------------------------------------------------
 
 
+@lru_cache(maxsize=4096)  # asked again for each blur that is tried
 def extent(layer: Layer, falloffs: float | None = None) -> Box:
     """A box that holds every point nearer to a layer than so many falloffs: all of its coverage by default."""
     formula = Formula(layer.structure, constant_row(layer.structure, layer.numbers))

@@ -13,7 +13,7 @@ import numpy as np
 from ...arrays import Float64Array
 from ...scene import Layer, Shape
 from .canvas import Canvas
-from .isobands import Band, band_edges, isobands, trace_grid
+from .isobands import Band, cover_bands, trace_grid
 from .sampling import SampleGrid, colors, covers
 
 LEAST = 1e-6
@@ -24,8 +24,7 @@ def part_bands(layer: Layer, count: int, canvas: Canvas) -> list[list[Band]]:
     grid = trace_grid(layer, canvas)
     if grid is None:
         return [[] for _ in layer.seen]
-    levels = [-edge for edge in band_edges(count)]
-    return [isobands(-alpha, levels, grid, canvas) for alpha in alphas(layer, grid, 1.0 / canvas.unit)]
+    return [cover_bands(alpha, count, grid, canvas) for alpha in alphas(layer, grid, 1.0 / canvas.unit)]
 
 
 def alphas(layer: Layer, grid: SampleGrid, pixel: float) -> list[Float64Array]:

@@ -260,7 +260,7 @@ class _Writer:
         points = np.array(geometry.points)
         if self.style.compact:
             turned = (np.roll(points, -first, axis=0) for first in range(len(points)))
-            data = min((self._relative(_polygon(corners)) for corners in turned), key=len)
+            data = min((self._relative(Contour.straight(pairs(corners))) for corners in turned), key=len)
         elif geometry.rounding < FLAT:
             data = f"M{self._joined(points)}Z"
         else:
@@ -324,11 +324,6 @@ def _usual_roundings(items: Sequence[Item]) -> dict[float, float]:
     figures = [item for item in items if isinstance(item, Figure)]
     counted = Counter((figure.blur, _rounding(figure)) for figure in figures if _rounding(figure))
     return {blur: rounding for (blur, rounding), _ in reversed(counted.most_common())}
-
-
-def _polygon(corners: Points) -> Contour:
-    first, *rest = pairs(corners)
-    return Contour(first, tuple((corner,) for corner in rest))
 
 
 def box_of(geometry: Geometry) -> Points:

@@ -1,0 +1,84 @@
+"""The smallest drawing, and those between it and the finest."""
+
+import gzip
+import random
+from functools import cache
+from typing import Any
+from xml.etree import ElementTree
+
+import numpy as np
+import pytest
+
+from sdf2vec import Layer, Scene, Sdf2vecError, Shape
+from sdf2vec.engines import ENGINES
+from sdf2vec.export import svg as svg_module
+from sdf2vec.export.options import Options
+from sdf2vec.export.svg import smallest
+from sdf2vec.export.svg import svg as write_svg
+from tests.export.svg.drawings import NAMESPACE, rendered, text_of
+from tests.scenes import random_shape
+
+
+def test_the_smallest_drawing_says_a_triangle_in_few_bytes():
+    """Whole coordinates, three digits of colour, one of opacity: gzipped, at most 16 bytes a triangle at 256."""
+    r = random.Random(7)
+    layers = []
+    for _ in range(256):
+        x, y = r.uniform(-0.5, 0.5), r.uniform(-0.5, 0.5)
+        corners: dict[str, Any] = {name: (x + r.gauss(0, 0.15), y + r.gauss(0, 0.15)) for name in "abc"}
+        color = (r.random(), r.random(), r.random())
+        layers.append(
+            Layer((Shape.of("triangle", color, **corners),), r.uniform(0.01, 0.2), r.uniform(0.4, 1.0))
+        )
+    scene = Scene(256, 256, tuple(layers), (0.5, 0.5, 0.5))
+    text = text_of(scene, svg_size_limit=22000)
+    root = ElementTree.fromstring(text)
+    assert root.get("viewBox") == "0 0 160 160"
+    assert root.get("width") == "256"
+    (group,) = (element for element in root if element.tag == f"{NAMESPACE}g")
+    assert len(group) == 256
+    for path in group:
+        assert len(path.get("color", "")) == 4
+        assert len(path.get("opacity", ".1")) == 2
+        assert "." not in path.get("d", ".")
+    assert len(gzip.compress(text.encode(), 9)) <= 4720
+
+
+@pytest.fixture
+def drawn_once(monkeypatch):
+    """A drawing follows from scene and detail: it is made once, however many limits it is held against."""
+    made, text = {}, svg_module._text
+
+    def once(planner, detail, options):
+        key = (planner.scene, planner.filters, detail, options.title)
+        if key not in made:
+            made[key] = text(planner, detail, options)
+        return made[key]
+
+    monkeypatch.setattr(svg_module, "_text", once)
+    monkeypatch.setattr(svg_module, "_planner", cache(svg_module._planner))
+
+
+@pytest.mark.usefixtures("drawn_once")
+@pytest.mark.parametrize("softest", [0.0, 0.15])
+def test_a_tighter_limit_takes_no_more_from_the_picture_than_it_must(softest, require_engine):
+    """From drawing to drawing, each a byte too large for the next limit: smaller and less near, by few dB a step."""
+    require_engine("resvg")
+    r = random.Random(9)
+    layers = tuple(
+        Layer((random_shape(("triangle", "ellipse", "box")[i % 3], r),), r.uniform(0.2, 1.0) * softest, 0.8)
+        for i in range(48)
+    )
+    scene = Scene(240, 180, layers, (0.5, 0.5, 0.5))
+    wanted = rendered(scene, 480, 360)
+    least = smallest(scene, Options())
+    texts = [text_of(scene)]
+    while texts[-1] != least:
+        texts.append(text_of(scene, svg_size_limit=len(texts[-1].encode()) - 1))
+    found = [-10 * np.log10(np.mean((ENGINES["resvg"].render(t, 480, 360) - wanted) ** 2)) for t in texts]
+    steps = -np.diff(found)
+    assert len(steps) >= 5
+    assert steps.min() > -1.0, found
+    assert steps.max() < 8.0, found
+    with pytest.raises(Sdf2vecError, match="bytes at least"):
+        write_svg(scene, Options(svg_size_limit=len(least.encode()) - 1))

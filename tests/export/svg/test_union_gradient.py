@@ -1,0 +1,61 @@
+"""Fills: a colour, a paint's gradient, the gradient nearest to a union's colours."""
+
+import numpy as np
+import pytest
+
+from sdf2vec import Layer, Scene, Shape
+from sdf2vec.export.svg.canvas import Canvas
+from sdf2vec.export.svg.display import LinearGradient
+from sdf2vec.export.svg.union_gradient import fill_of, mean_color, nearest_gradient, ramp_of
+from tests.export.svg.drawings import Parameters
+
+CANVAS = Canvas.of(Scene(300, 200, (), None))
+RED, BLUE = (1.0, 0.0, 0.0), (0.0, 0.0, 1.0)
+PLACE: Parameters = {"center": (0, 0), "radius": 0.25}
+
+
+def test_one_colour_is_that_colour():
+    shape = Shape.of("circle", RED, **PLACE)
+    assert fill_of(Layer((shape,), 0.1), CANVAS) == (RED, 0.0)
+    assert fill_of(Layer((shape,), 0.1), CANVAS, 255.0 / 2).fill == (1.5, 0.5, 0.5)
+    assert ramp_of(shape, CANVAS) is None
+
+
+def test_a_linear_paint_is_its_gradient():
+    """A direction of one half goes from −1 to 1 of the frame: from edge to edge of the disc."""
+    shape = Shape.of("circle", RED, paint="linear", color_end=BLUE, direction=(0.5, 0), **PLACE)
+    ramp = ramp_of(shape, CANVAS)
+    assert ramp is not None
+    assert ramp.start == pytest.approx((100.0, 100.0))
+    assert ramp.end == pytest.approx((200.0, 100.0))
+    assert [stop.color for stop in ramp.stops] == [RED, BLUE]
+    assert fill_of(Layer((shape,), 0.1), CANVAS) == (ramp, 0.0)
+    assert mean_color(shape) == (0.5, 0.0, 0.5)
+
+
+def test_two_colours_of_a_union_lie_along_a_line():
+    left, right = (
+        Shape.of("circle", color, center=(x, 0), radius=0.2) for x, color in ((-0.2, RED), (0.2, BLUE))
+    )
+    fill, error = fill_of(Layer.union((left, right), 0.1, 0.05), CANVAS)
+    assert isinstance(fill, LinearGradient)
+    assert abs(fill.end[1] - fill.start[1]) < 0.01 * abs(fill.end[0] - fill.start[0])
+    first, *_, last = sorted(
+        (place, stop.color)
+        for place, stop in zip(
+            np.linspace(fill.start[0], fill.end[0], len(fill.stops)), fill.stops, strict=True
+        )
+    )
+    assert first[1][0] > 0.9 > 0.1 > first[1][2]
+    assert last[1][2] > 0.9 > 0.1 > last[1][0]
+    assert 0 < error < 20
+
+
+def test_the_nearest_gradient_of_a_gradient_is_itself():
+    r = np.random.default_rng(0)
+    places = r.uniform(-1, 1, (500, 2))
+    along = places @ np.array([0.6, 0.8])
+    wanted = np.stack([along, 1 - along, 0.5 + 0 * along], axis=1)
+    knots, values, error = nearest_gradient(places, wanted, np.ones(500))
+    assert error < 2e-3
+    assert values[:, 0] == pytest.approx(knots @ np.array([0.6, 0.8]), abs=0.02)

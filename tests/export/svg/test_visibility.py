@@ -1,0 +1,33 @@
+"""How much each layer shows, by hand."""
+
+import numpy as np
+import pytest
+
+from sdf2vec import Layer, Scene, Shape
+from sdf2vec.export.svg.visibility import contrasts, layers_at, showing, steps_over
+
+
+def test_a_layer_shows_through_those_above():
+    assert showing(np.array([[0.5], [0.25], [0.5]])).tolist() == [[0.375], [0.5], [1.0]]
+
+
+def test_steps_are_from_what_lies_below():
+    """White at one half on black is grey: to red from there is +½, −½, −½; on no ground alpha grows, too."""
+    alphas, colors = np.array([[0.5], [1.0]]), np.array([[[1.0]] * 3, [[1.0], [0.0], [0.0]]])
+    first, second = steps_over(alphas, colors, np.zeros(3))
+    assert first[:, 0].tolist() == [1, 1, 1, 0]
+    assert second[:, 0].tolist() == [0.5, -0.5, -0.5, 0]
+    first, second = steps_over(alphas, colors, None)
+    assert first[:, 0].tolist() == [1, 1, 1, 1]
+    assert second[:, 0].tolist() == [0.5, -0.5, -0.5, 0.5]
+
+
+def test_what_is_hidden_costs_nothing():
+    def disc(radius, color, opacity=1.0):
+        return Layer((Shape.of("circle", color, center=(0, 0), radius=radius),), 0.05, opacity)
+
+    scene = Scene(64, 64, (disc(0.1, (1, 1, 1)), disc(0.4, (0, 0, 0)), disc(0.2, (1, 1, 1), 0.5)), (1, 1, 1))
+    hidden, black, grey = contrasts(scene, layers_at(scene))
+    assert hidden < 1e-4
+    assert black == pytest.approx(1.0, abs=0.05)
+    assert grey == pytest.approx(0.25, abs=0.02)

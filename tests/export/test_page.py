@@ -1,0 +1,156 @@
+"""The page in a real browser: pixels, resizing, the fallback, copying, comparing."""
+
+import json
+import re
+from xml.etree import ElementTree
+
+import numpy as np
+import pytest
+
+import sdf2vec
+from sdf2vec import Layer, Scene, Shape
+from sdf2vec.engines import chromium
+from sdf2vec.export import packing
+from sdf2vec.export import page as page_module
+from sdf2vec.image import encode_png
+from tests.scenes import random_scene
+
+SCENE = random_scene(("circle", "triangle"), layers=9, seed=4, width=120, height=80)
+RECORD_COPIES = "navigator.clipboard.writeText = async (text) => { window.copied = text; }"
+NO_WEBGL = "<script>HTMLCanvasElement.prototype.getContext = () => null;</script>"
+
+
+@pytest.fixture(autouse=True)
+def _quick_packing(monkeypatch):
+    monkeypatch.setattr(packing, "SAMPLE", 1 << 17)
+
+
+def page_of(scene, **options):
+    text = sdf2vec.export(scene, "html", title='a "quoted" <picture>', **options)
+    assert isinstance(text, str)
+    return text
+
+
+@pytest.fixture
+def opened(require_engine):
+    require_engine("chromium")
+    return lambda text, width, height: chromium.opened({"index.html": text}, width, height)
+
+
+def box(page, selector):
+    return page.locator(selector).bounding_box()
+
+
+def assert_shows(page, scene, levels=1.6):
+    """The picture on the page is the render at its size in device pixels, but for 8-bit rounding."""
+    page.wait_for_function("document.querySelector('canvas').width > 1")
+    page.wait_for_timeout(300)
+    width, height = page.evaluate(
+        "[document.querySelector('canvas').width, document.querySelector('canvas').height]"
+    )
+    shown = chromium.screenshot(page, "canvas")[:height, :width, :3]  # it rounds fractional boxes up
+    assert shown.shape[:2] == (height, width)
+    difference = 255 * np.abs(shown - sdf2vec.render(scene, width, height))
+    assert difference.max() <= levels
+    assert difference.mean() <= 0.5
+
+
+def test_page_shows_the_scene_and_follows_its_size(opened):
+    with opened(page_of(SCENE), 400, 500) as page:
+        assert_shows(page, SCENE)
+        page.set_viewport_size({"width": 641, "height": 700})
+        assert page.wait_for_function("document.querySelector('canvas').width > 550")
+        assert_shows(page, SCENE)
+        assert not page.locator(".fallback").is_visible()
+
+
+def test_page_holds_all_that_it_needs(opened):
+    requests = []
+    with opened(page_of(SCENE), 300, 300) as page:
+        page.on("request", lambda request: requests.append(request.url))
+        page.reload()
+        page.wait_for_function("document.querySelector('canvas').width > 1")
+    assert [url for url in requests if not url.startswith("data:")] == [chromium.ORIGIN]
+    assert not re.search(r'(src|href)="(?!data:)', page_of(SCENE))
+
+
+def test_without_webgl_the_drawing_is_shown(opened):
+    text = page_of(SCENE).replace("</head>", NO_WEBGL + "</head>")
+    with opened(text, 400, 400) as page:
+        assert page.locator(".fallback svg").is_visible()
+        assert not page.locator("canvas").is_visible()
+        place = box(page, ".fallback svg")
+        assert place["width"] / place["height"] == pytest.approx(1.5, abs=0.02)
+
+
+def test_a_scene_without_a_drawing_falls_back_to_pixels(opened, monkeypatch):
+    def refuse(scene, options):
+        raise sdf2vec.Sdf2vecError("no")
+
+    monkeypatch.setattr(page_module, "svg", refuse)
+    text = page_of(SCENE).replace("</head>", NO_WEBGL + "</head>")
+    assert "Copy SVG" not in text
+    with opened(text, 300, 300) as page:
+        assert page.evaluate("document.querySelector('.fallback img').naturalWidth") == 120
+
+
+def test_buttons_copy_the_texts(opened):
+    with opened(page_of(SCENE), 300, 300) as page:
+        page.evaluate(RECORD_COPIES)
+        for name in ("svg", "shadertoy", "glsl", "wgsl"):
+            page.locator(f'[data-text="{name}"]').focus()
+            page.keyboard.press("Enter")
+            page.wait_for_function("document.querySelector('[role=status]').textContent.endsWith('copied.')")
+            copied = page.evaluate("window.copied")
+            assert _canonical(copied) == _canonical(_text(name)) if name == "svg" else copied == _text(name)
+            page.evaluate("document.querySelector('[role=status]').textContent = ''")
+
+
+def _text(name):
+    return sdf2vec.export(SCENE, name, title='a "quoted" <picture>', alone=True)
+
+
+def _canonical(drawing):
+    return ElementTree.canonicalize(drawing, strip_text=True)
+
+
+def test_slider_uncovers_the_original(opened):
+    red = encode_png(np.broadcast_to(np.array([1, 0, 0], np.float32), (8, 12, 3)))
+    blue = Scene(12, 8, (Layer((Shape.of("circle", (0, 0, 1), center=(0, 0), radius=3),), 0.1),))
+    with opened(page_of(blue, original=red), 300, 300) as page:
+        page.wait_for_function("document.querySelector('canvas').width > 1")
+        page.locator("#split").focus()
+        for _ in range(20):
+            page.keyboard.press("ArrowRight")
+        shown = chromium.screenshot(page, ".picture")
+        edge = int(shown.shape[1] * 0.7)
+        np.testing.assert_allclose(
+            shown[20, 5 : edge - 3, :3], np.broadcast_to([1, 0, 0], (edge - 8, 3)), atol=0.01
+        )
+        np.testing.assert_allclose(shown[20, edge + 3 : -5, 2], 1, atol=0.01)
+        assert page.evaluate("document.querySelector('.original').alt")
+
+
+def test_page_speaks_to_screen_readers(opened):
+    with opened(page_of(SCENE), 300, 300) as page:
+        name = page.evaluate("document.querySelector('canvas').getAttribute('aria-label')")
+        assert name == 'a "quoted" <picture>'
+        assert page.get_by_role("img", name="quoted").count() >= 1
+        assert page.get_by_role("button").count() == 4
+        assert page.evaluate("document.documentElement.lang") == "en"
+
+
+def test_texts_can_not_end_the_script():
+    page = sdf2vec.export(SCENE, "html", title="</script><script>alert(1)</script>")
+    assert isinstance(page, str)
+    texts = re.search(r'id="texts">(.*?)</script>', page, re.DOTALL)
+    assert texts
+    assert set(json.loads(texts[1])) == {"fragment", "shadertoy", "glsl", "wgsl"}
+    assert "<script>alert" not in page
+
+
+@pytest.mark.parametrize("layers", [0, 1])
+def test_hardly_any_shapes(layers, opened):
+    scene = Scene(30, 30, random_scene(("circle",), layers=layers).layers, (0.2, 0.4, 0.6))
+    with opened(page_of(scene), 300, 400) as page:
+        assert_shows(page, scene)
