@@ -179,10 +179,16 @@ class Fit:
             image = fused.composite(tensors, target.shape[2], target.shape[1], len(target))
             layers, full = _layers_of(self.settings), tensors.layer_count + count
             _add(tensors, optimizer, densify(image, target, count, tensors, layers, self.generator))
-            rest = place(target, self.size, layers, full - tensors.layer_count, ANYWHERE, self.generator)
-            for group in rest.groups:
-                group.order += tensors.layer_count
-            _add(tensors, optimizer, rest.groups)
+            rest = full - tensors.layer_count
+            if rest > 0:
+                _add(tensors, optimizer, self._anywhere(target, rest, tensors.layer_count))
+
+    def _anywhere(self, target: torch.Tensor, count: int, first: int) -> list[Group]:
+        """New layers anywhere, in the picture's colours, their draw order beginning with `first`."""
+        groups = place(target, self.size, _layers_of(self.settings), count, ANYWHERE, self.generator).groups
+        for group in groups:
+            group.order += first
+        return groups
 
     def _announce_compiling(self) -> None:
         if not self.backend.is_compiled(self.tensors, self.pixels.shape[2]):
@@ -240,12 +246,8 @@ class Fit:
         image = self._draw(self.tensors, stage.target)
         loss = float(stage.measure(image).detach())
         scores = self._scores(image, stage)
-        places = place(
-            stage.target.cpu(), self.size, _layers_of(self.settings), count, ANYWHERE, self.generator
-        )
-        for group in places.groups:
-            group.order += self.tensors.layer_count
-        relocate(self.tensors, self.optimizer, scores, places.groups)
+        fresh = self._anywhere(stage.target.cpu(), count, self.tensors.layer_count)
+        relocate(self.tensors, self.optimizer, scores, fresh)
         first = self.tensors.layer_count - count
         phase = Phase("trial", TRIAL_STEPS, stage.phase.resolution, rate=TRIAL_RATE, end_rate=0.05)
         self.optimizer = self._adam()

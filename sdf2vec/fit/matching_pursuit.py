@@ -22,6 +22,7 @@ SMALLEST_RADIUS, LARGEST_RADIUS = (
 WIDTH = 0.6  # standard deviation of the Gaussian that stands for a disc of radius 1
 DISC = 0.7  # amount of a disc in that of the Gaussian which fits it best: 1 / (2 − 2·exp(−u)), u = 1.256
 TINY = 1e-9
+LEAST = 1e-5  # mean squared error, below one level of 255: no reason to paint, and above what rounding makes
 APART = 1.5  # radii around a disc where none is put in the same round
 
 
@@ -75,7 +76,7 @@ class Painted(NamedTuple):
         hidden = (residual * self.image * matters).sum(0, keepdim=True)
         lost = (self.image.square() * matters).sum(0, keepdim=True)
         fixed = 2.0 * _blurred(hidden, radii) + _blurred(lost, narrow)
-        gains = (colors * (2.0 * linear - colors * energy)).sum(1) - fixed[:, 0]
+        gains = (colors * (2.0 * linear - colors * energy)).sum(1) - fixed[:, 0] - LEAST * energy[:, 0]
         return colors, gains
 
     def apply(self, window: torch.Tensor, color: torch.Tensor) -> None:
