@@ -34,6 +34,7 @@ FLAGS: dict[str, Any] = {
     "fastmath": {"reassoc", "nsz", "arcp", "contract", "afn"},
     "error_model": "numpy",  # what lets LLVM vectorise divisions
     "nogil": True,
+    "no_cfunc_wrapper": True,  # nothing calls them from C
 }
 DIGEST = hashlib.sha256().digest_size
 

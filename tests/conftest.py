@@ -1,4 +1,4 @@
-"""Fixtures that all tests share; one thread for each of several processes that share the tests."""
+"""Fixtures that all tests share."""
 
 import os
 from collections.abc import Callable
@@ -7,10 +7,6 @@ from importlib.util import find_spec
 import pytest
 
 from sdf2vec.engines import ENGINES, glslang
-
-if "PYTEST_XDIST_WORKER" in os.environ:  # torch reads it when it is loaded, after this
-    for name in ("OMP_NUM_THREADS", "SDF2VEC_THREADS"):
-        os.environ.setdefault(name, "1")
 
 MISSING = {name: engine.missing for name, engine in ENGINES.items()} | {
     "glslang": glslang.missing,

@@ -2,7 +2,6 @@
 
 import gzip
 import random
-from functools import cache
 from typing import Any
 from xml.etree import ElementTree
 
@@ -11,7 +10,6 @@ import pytest
 
 from sdf2vec import Layer, Scene, Sdf2vecError, Shape
 from sdf2vec.engines import ENGINES
-from sdf2vec.export import svg as svg_module
 from sdf2vec.export.options import Options
 from sdf2vec.export.svg import smallest
 from sdf2vec.export.svg import svg as write_svg
@@ -42,21 +40,6 @@ def test_the_smallest_drawing_says_a_triangle_in_few_bytes():
         assert len(path.get("opacity", ".1")) == 2
         assert "." not in path.get("d", ".")
     assert len(gzip.compress(text.encode(), 9)) <= 4720
-
-
-@pytest.fixture
-def drawn_once(monkeypatch):
-    """A drawing follows from scene and detail: it is made once, however many limits it is held against."""
-    made, text = {}, svg_module._text
-
-    def once(planner, detail, options):
-        key = (planner.scene, planner.filters, detail, options.title)
-        if key not in made:
-            made[key] = text(planner, detail, options)
-        return made[key]
-
-    monkeypatch.setattr(svg_module, "_text", once)
-    monkeypatch.setattr(svg_module, "_planner", cache(svg_module._planner))
 
 
 @pytest.mark.usefixtures("drawn_once")

@@ -101,6 +101,7 @@ def test_portable_has_neither_filters_nor_blend_modes():
     assert not re.search(r"<filter|filter=|<mask|<style|mix-blend-mode", text)
 
 
+@pytest.mark.usefixtures("drawn_once")
 def test_a_size_limit_is_kept_or_refused():
     scene = random_scene(("box", "triangle"), layers=40, seed=7, paints=("flat",), joins=())
     free = len(text_of(scene).encode())
