@@ -122,7 +122,7 @@ EVERYTHING: dict[str, dict[str, Any]] = {
     "palette": {"palette": PALETTE, "trials": 1},
     "colors": {"colors": 3, "union": 2},
     "area": {"min_area": 0.02},
-    "start": {"start": START, "trials": 1},
+    "start": {"start": START, "kind": "triangle", "trials": 1},  # which are turned at random
 }
 
 
