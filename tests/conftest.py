@@ -2,6 +2,7 @@
 
 import os
 from collections.abc import Callable
+from importlib import import_module
 from importlib.util import find_spec
 
 import pytest
@@ -21,6 +22,12 @@ def require_engine() -> Callable[[str], None]:
     It skips on a user's machine and fails where the environment variable CI says that nothing may be missing.
     """
     return _require_engine
+
+
+@pytest.fixture
+def kernels_there(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A fit finds its kernels compiled, whatever has run before: else the first that it says is that it compiles."""
+    monkeypatch.setattr(import_module("sdf2vec.render.kernels"), "is_compiled", lambda *arguments: True)
 
 
 def _require_engine(name: str) -> None:

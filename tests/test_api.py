@@ -142,6 +142,7 @@ def test_impossible_pictures(image):
     assert "\n" not in str(caught.value)
 
 
+@pytest.mark.usefixtures("kernels_there")
 def test_the_callback_sees_every_step(levels):
     seen: list[Progress] = []
 
@@ -160,6 +161,7 @@ def test_the_callback_sees_every_step(levels):
     assert scene == fit(levels)
 
 
+@pytest.mark.usefixtures("kernels_there")
 def test_the_callback_stops_the_fit(levels):
     seen = []
 

@@ -16,7 +16,7 @@ from sdf2vec.fit.presets import PRESETS, Start
 from sdf2vec.fit.settings import Settings
 from sdf2vec.layer import Part
 from sdf2vec.metrics import mse, psnr
-from sdf2vec.render import culled, triton_fused
+from sdf2vec.render import culled, kernels, triton_fused
 from sdf2vec.render.reference import render
 from sdf2vec.render.tensors import from_scene
 from sdf2vec.shapes import KINDS
@@ -79,6 +79,7 @@ def test_the_same_seed_gives_the_same_scene_and_another_another():
     assert scenes[0] == scenes[1] != scenes[2]
 
 
+@pytest.mark.usefixtures("kernels_there")
 def test_progress_and_stopping():
     seen = []
 
@@ -98,6 +99,21 @@ def test_odd_pictures(size):
     pixels = np.full((size[1], size[0], 3), 0.4, dtype=np.float32)
     scene = sdf2vec.fit(pixels, 3, preset="fast", kind="mixed")
     assert float((render(scene)[:3] - 0.4).abs().max()) < 0.05
+
+
+@pytest.mark.parametrize("there", [True, False])
+def test_it_is_said_before_kernels_are_compiled(there, monkeypatch):
+    monkeypatch.setattr(kernels, "is_compiled", lambda *arguments: there)
+    seen = []
+
+    def callback(progress):
+        seen.append(progress)
+        return progress.step == 1
+
+    fit_picture(picture(), Settings(4, ("box",), preset="fast", device="cpu"), callback)
+    assert [p.step for p in seen] == ([1] if there else [0, 1])
+    assert seen[0].phase.startswith("compiling kernels") == (not there)
+    assert math.isnan(seen[0].loss) == (not there)
 
 
 def test_shapes_start_where_the_picture_has_detail():

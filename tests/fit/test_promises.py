@@ -49,6 +49,7 @@ def watched_trials(monkeypatch) -> list[tuple[float, float]]:
     return losses
 
 
+@pytest.mark.usefixtures("kernels_there")
 def test_trials_never_make_it_worse(monkeypatch):
     losses = watched_trials(monkeypatch)
     seen: list[Progress] = []

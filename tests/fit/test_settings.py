@@ -44,6 +44,7 @@ def thesis_picture():
     return picture(64, 48)
 
 
+@pytest.mark.usefixtures("kernels_there")
 def test_the_thesis_preset_keeps_its_ranges(monkeypatch):
     def never(*arguments):
         pytest.fail("a layer was relocated")
