@@ -62,6 +62,11 @@ class Picture:
         """Whether any pixel is less than fully opaque."""
         return bool(self.pixels.shape[2] == 4)
 
+    @property
+    def premultiplied(self) -> Float32Array:
+        """Its pixels [H, W, 3], or with alpha [H, W, 4], premultiplied."""
+        return premultiply(self.pixels) if self.has_alpha else self.pixels
+
 
 @functools.singledispatch
 def load(source: Any) -> Picture:

@@ -9,7 +9,7 @@ import torch
 
 from .fit.loop import scaled
 from .flip import flip
-from .image import Picture, premultiply
+from .image import Picture
 from .metrics import psnr
 from .render.draw import draw_fast
 from .scene import Scene
@@ -30,7 +30,7 @@ def quality(scene: Scene, picture: Picture) -> Quality:
 
     FLIP is that of both scaled down to about a million pixels, where they have more.
     """
-    pixels = premultiply(picture.pixels) if picture.has_alpha else picture.pixels
+    pixels = picture.premultiplied
     drawn = draw_fast(scene, picture.width, picture.height)[: pixels.shape[2]]
     target = torch.from_numpy(np.ascontiguousarray(pixels.transpose(2, 0, 1)))
     small = [scaled(planes.permute(1, 2, 0).numpy(), FLIP_RESOLUTION) for planes in (drawn, target)]

@@ -9,11 +9,10 @@ from typing import Any, NamedTuple
 import numpy as np
 import torch
 
-from ..arrays import Float32Array
 from ..fit.loop import fit_picture
 from ..fit.settings import settings_of
 from ..flip import flip
-from ..image import Picture, premultiply
+from ..image import Picture
 from ..metrics import psnr, ssim
 from ..render.draw import draw
 from ..scene import Scene
@@ -35,15 +34,15 @@ def measured(picture: Picture, shapes: int, **options: Any) -> tuple[Fitted, Sce
     started, used = time.perf_counter(), _cpu()
     scene = fit_picture(picture, settings)
     seconds, cpu = time.perf_counter() - started, _cpu() - used
-    target = torch.from_numpy(np.ascontiguousarray(as_seen(picture).transpose(2, 0, 1)))
+    target = tensor_of(picture)
     image = draw(scene, picture.width, picture.height)[: len(target)]
     near, alike, seen = (float(metric(image, target)) for metric in (psnr, ssim, flip))
     return Fitted(near, alike, seen, seconds, cpu), scene
 
 
-def as_seen(picture: Picture) -> Float32Array:
-    """Its pixels [H, W, C], premultiplied where there is alpha."""
-    return premultiply(picture.pixels) if picture.has_alpha else picture.pixels
+def tensor_of(picture: Picture) -> torch.Tensor:
+    """Its pixels [C, H, W], premultiplied where there is alpha."""
+    return torch.from_numpy(np.ascontiguousarray(picture.premultiplied.transpose(2, 0, 1)))
 
 
 def median(fits: list[Fitted]) -> Fitted:

@@ -15,12 +15,12 @@ from typing import Any, NamedTuple
 import numpy as np
 import skimage
 
+from ..api import render
 from ..arrays import Float32Array
 from ..files import write_atomically
 from ..image import Picture, encode_png, load, resize
-from ..render.draw import draw
 from ..scene import Scene
-from .fits import Fitted, as_seen, measured
+from .fits import Fitted, measured
 
 FACE = (0.435, 0.225, 0.13)  # of the astronaut: centre and radius, in shares of the width and the height
 ELSEWHERE = 0.3  # how much an error matters far from the face
@@ -54,14 +54,8 @@ def weight_map(height: int, width: int, face: tuple[float, float, float]) -> Flo
 def psnr_in_face(image: Float32Array, picture: Picture, weights: Float32Array) -> float:
     """dB of an image [H, W, 3] where an error matters more than half way between elsewhere and the face."""
     face = weights > (1.0 + ELSEWHERE) / 2
-    wrong = image - as_seen(picture)[..., :3]
+    wrong = image - picture.premultiplied[..., :3]
     return float(-10 * np.log10(np.mean(wrong[face] ** 2)))
-
-
-def drawn(scene: Scene) -> Float32Array:
-    """The render [H, W, 3] at the picture's size."""
-    image: Float32Array = draw(scene, scene.width, scene.height)[:3].numpy().transpose(1, 2, 0)
-    return image.clip(0.0, 1.0)
 
 
 def row(way: Way, fitted: Fitted, in_face: float, scene: Scene) -> str:
@@ -77,10 +71,10 @@ def page(picture: Picture, face: tuple[float, float, float], preset: str, comman
     """The table; the figure is written on the way."""
     weights = weight_map(picture.height, picture.width, face)
     source = Picture(np.repeat(weights[..., None], 3, axis=2))
-    rows, renders = [], [as_seen(picture)[..., :3]]
+    rows, renders = [], [picture.premultiplied[..., :3]]
     for way in WAYS:
         fitted, scene = measured(picture, way.shapes, preset=preset, weights=source, seed=0, **way.options)
-        renders.append(drawn(scene))
+        renders.append(render(scene))
         rows.append(row(way, fitted, psnr_in_face(renders[-1], picture, weights), scene))
         print(rows[-1], flush=True)
     small = [resize(np.ascontiguousarray(image), *_shown_size(picture)) for image in renders]

@@ -22,10 +22,11 @@ import torch
 from .. import api
 from ..files import write_atomically
 from ..flip import flip
-from ..image import Picture, load, premultiply
+from ..image import load
 from ..metrics import psnr, ssim
 from ..render.reference import render
 from ..scene import Scene
+from .fits import tensor_of
 
 
 @dataclass(frozen=True)
@@ -50,7 +51,7 @@ def measure(path: Path, shapes: int, **options: Any) -> Row:
     started = time.perf_counter()
     scene = api.fit(picture, shapes, **options)
     seconds = time.perf_counter() - started
-    target = _tensor(picture)
+    target = tensor_of(picture)
     drawn = _eight_bits(scene)[: len(target)]
     values = float(psnr(drawn, target)), float(ssim(drawn, target)), float(flip(drawn, target))
     numbers = sum(len(layer.numbers) for layer in scene.layers)
@@ -60,11 +61,6 @@ def measure(path: Path, shapes: int, **options: Any) -> Row:
 
 def _eight_bits(scene: Scene) -> torch.Tensor:
     return (render(scene) * 255).round() / 255
-
-
-def _tensor(picture: Picture) -> torch.Tensor:
-    pixels = premultiply(picture.pixels) if picture.has_alpha else picture.pixels
-    return torch.from_numpy(np.ascontiguousarray(pixels.transpose(2, 0, 1)))
 
 
 def table(rows: list[Row], command: str) -> str:

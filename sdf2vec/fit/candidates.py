@@ -86,9 +86,7 @@ class Opening:
                 own = shape.get(slot.parameter.name)
                 values[slot] = start_of(slot.parameter, here, looks) if own is None else own
             else:
-                later = slot.part is not None and slot.part > self.index
-                old = Slot(slot.part - 1, slot.parameter) if later and slot.part else slot
-                values[slot] = self.layer.values[old]
+                values[slot] = self.layer.values[_closed_up(slot, self.index)]
         return Group(self.structure(part), self.layer.order, values)
 
 
@@ -128,12 +126,15 @@ def reductions(layer: Group) -> Iterator[Group]:
 def without(layer: Group, index: int) -> Group:
     """A layer without one of its parts; the next one is not made the first."""
     parts = layer.structure
-    values = {}
-    for slot, tensor in layer.values.items():
-        if slot.part != index:
-            later = slot.part is not None and slot.part > index
-            values[Slot(slot.part - 1, slot.parameter) if later and slot.part else slot] = tensor
+    values = {_closed_up(slot, index): tensor for slot, tensor in layer.values.items() if slot.part != index}
     return Group((*parts[:index], *parts[index + 1 :]), layer.order, values)
+
+
+def _closed_up(slot: Slot, index: int) -> Slot:
+    """Where the slot of another part is when the part of this number is gone."""
+    if slot.part is None or slot.part < index:
+        return slot
+    return Slot(slot.part - 1, slot.parameter)
 
 
 def alone(layer: Group, color: torch.Tensor, falloff: float, around: Surroundings) -> list[Opening]:

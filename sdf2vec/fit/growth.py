@@ -85,10 +85,8 @@ def densify(
     """
     image, target = image.detach().cpu(), target.cpu()
     weights = torch.ones(target.shape[1:]) if weights is None else weights.cpu()
-    if layers.signed:
-        found = find_discs(Missing(target - image, weights), count)
-    else:
-        found = find_discs(Painted(image.clone(), target, weights), count)
+    canvas = Missing(target - image, weights) if layers.signed else Painted(image.clone(), target, weights)
+    found = find_discs(canvas, count)
     height, width = target.shape[1:]
     centers = (found.centers / torch.tensor([width, height]) - 0.5) * torch.tensor(tensors.size)
     sizes = found.radii * ROOM * (tensors.size[0] / width)

@@ -98,7 +98,7 @@ class Fit:
         self.preset = preset_of(settings)
         self.backend: Backend = choose(settings.device)
         self.generator = torch.Generator().manual_seed(settings.seed)
-        self.pixels = premultiply(picture.pixels) if picture.has_alpha else picture.pixels
+        self.pixels = picture.premultiplied
         self.pixel = 1.0 / min(picture.width, picture.height)
         self.size = (picture.width * self.pixel, picture.height * self.pixel)
         self.done, self.steps, self.stopped = 0, self._count_steps(), False

@@ -86,7 +86,7 @@ def stacked(bands: Sequence[Band], apart: bool) -> Iterator[tuple[list[Points], 
     little at every one.
     """
     below = 0.0
-    for (cover, outer), (_, inner) in zip(bands, [*bands[1:], Band(1.0, [])], strict=False):
+    for (cover, outer), (_, inner) in zip(bands, [*bands, Band(1.0, [])][1:], strict=True):
         if outer:
             yield (outer + inner, cover) if apart else (outer, (cover - below) / (1.0 - below))
         below = cover
