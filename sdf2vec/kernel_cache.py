@@ -1,6 +1,7 @@
 """How kernels for the CPU are compiled, and where their machine code is kept: the user's cache folder.
 
-`kernel` compiles what is called from outside, `inlined` what kernels are made of. Machine code is found again by a
+`kernel` compiles what Python calls, `entry` what kernels `call` by its address, so that they need not be compiled
+with it, and `inlined` what both are made of. Machine code is found again by a
 fingerprint of all that was compiled into it, so that a kernel may call what another module defines; numba's own
 `cache=True` looks at one file's time of change only. Where the folder can't be written to, kernels are compiled anew
 in every run, with one warning.
@@ -15,7 +16,8 @@ import pickle
 import sys
 import warnings
 from collections.abc import Callable, Iterator
-from functools import cache
+from dataclasses import dataclass
+from functools import cache, cached_property
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from types import FunctionType, ModuleType
@@ -25,7 +27,10 @@ import llvmlite
 import numba
 import numpy as np
 import platformdirs
-from numba.core import caching, compiler, serialize
+from llvmlite import ir
+from numba import types
+from numba.core import caching, ccallback, compiler, serialize
+from numba.extending import intrinsic
 
 from .errors import Sdf2vecError
 from .files import write_atomically
@@ -34,8 +39,8 @@ FLAGS: dict[str, Any] = {
     "fastmath": {"reassoc", "nsz", "arcp", "contract", "afn"},
     "error_model": "numpy",  # what lets LLVM vectorise divisions
     "nogil": True,
-    "no_cfunc_wrapper": True,  # nothing calls them from C
 }
+UNWRAPPED: dict[str, Any] = {"no_cfunc_wrapper": True}  # nothing calls it from C
 DIGEST = hashlib.sha256().digest_size
 
 inlined: Callable[[Callable[..., Any]], Any] = numba.njit(**FLAGS, forceinline=True)
@@ -47,9 +52,51 @@ def kernel(function: FunctionType) -> Any:
     What it calls is to be `inlined`: were that kept, too, a fresh compilation and one from disk could link different
     copies of a function, which differ in the last digits.
     """
-    dispatcher = numba.njit(**FLAGS)(function)
+    dispatcher: Any = numba.njit(**FLAGS, **UNWRAPPED)(function)
     dispatcher._cache = _Kept(function)
     return dispatcher
+
+
+@dataclass(frozen=True)
+class Entry:
+    """A function that kernels call by its address: compiled when that is first asked for; its machine code is kept."""
+
+    py_func: FunctionType
+    signature: Any
+
+    @property
+    def address(self) -> int:
+        return int(self._compiled.address)
+
+    @cached_property
+    def _compiled(self) -> Any:
+        signature = self.signature.args, self.signature.return_type
+        function: Any = ccallback.CFunc(self.py_func, signature, {}, FLAGS)
+        function._cache = _Kept(self.py_func)
+        function.compile()
+        return function
+
+
+def entry(*arguments: Any) -> Callable[[FunctionType], Entry]:
+    """Decorator: an `Entry` that takes arguments of these types and returns nothing; arrays as pointers to their
+    first number."""
+    return lambda function: Entry(function, types.void(*arguments))
+
+
+@intrinsic
+def call(_: Any, address: Any, arguments: Any) -> Any:
+    """Calls the `Entry` at an address with a tuple of arguments, whose types have to be as it was declared with."""
+
+    def generate(context: Any, builder: Any, signature: Any, values: Any) -> Any:
+        given = [builder.extract_value(values[1], index) for index in range(len(arguments))]
+        for index, kind in enumerate(arguments):
+            if isinstance(kind, types.Array):
+                given[index] = context.make_array(kind)(context, builder, given[index]).data
+        result = context.get_value_type(signature.return_type)
+        function = ir.FunctionType(result, [value.type for value in given])
+        return builder.call(builder.inttoptr(values[0], function.as_pointer()), given)
+
+    return types.void(address, arguments), generate
 
 
 @cache

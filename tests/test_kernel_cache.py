@@ -81,6 +81,19 @@ def f(x):
 """
 
 
+ENTRY = """
+from numba import carray, types
+from sdf2vec.kernel_cache import call, entry, kernel
+@entry(types.CPointer(types.float32), types.int64)
+def double(numbers, count):
+    for i in range(count):
+        carray(numbers, count)[i] *= 2
+@kernel
+def run(address, numbers, count):
+    call(address, (numbers, count))
+"""
+
+
 def stem(source):
     """How the files of f are named, with the module's own name left out."""
     function = kernel_cache.load(source).f.py_func
@@ -113,9 +126,18 @@ def test_fingerprints_differ_with_what_compiles(monkeypatch):
 
 
 def test_kernels_of_other_formulas_are_other_kernels():
-    one, other = (kernels.load(((Part("circle"),),), mode, 3) for mode in ("over", "additive"))
-    assert isinstance(one.forward_tiles.py_func, FunctionType)
-    assert kernel_cache._stem(one.forward_tiles.py_func) != kernel_cache._stem(other.forward_tiles.py_func)
+    one, other = (kernels.drawing((Part("circle"),), mode, 3)[0] for mode in ("over", "additive"))
+    assert isinstance(one.py_func, FunctionType)
+    assert kernel_cache._stem(one.py_func) != kernel_cache._stem(other.py_func)
+
+
+def test_an_entry_is_called_by_its_address():
+    """Arrays are handed over as pointers to their first number; the machine code is kept."""
+    module = kernel_cache.load(ENTRY)
+    numbers = np.arange(4, dtype=np.float32)
+    module.run(module.double.address, numbers[1:], 2)
+    assert list(numbers) == [0, 2, 4, 3]
+    assert kernel_cache.is_compiled(module.double)
 
 
 # --- digits -------------------------------------------------------------------------------------------------

@@ -7,8 +7,8 @@ number of threads.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
-from types import ModuleType
 from typing import Any
 
 import numpy as np
@@ -17,6 +17,7 @@ from torch.autograd.function import once_differentiable
 
 from ..arrays import Float32Array, Int32Array, IntArray
 from ..blend import COMPOSITING
+from ..kernel_cache import Entry
 from ..layer import Structure
 from ..threads import in_threads
 from . import kernels, tiling
@@ -41,13 +42,12 @@ def _canvas(tensors: SceneTensors, width: int, height: int, channels: int) -> tu
     """What a render needs, and the layers' rows of numbers in draw order."""
     axes = canvas_axes(tensors, -(-width // TILE) * TILE, -(-height // TILE) * TILE, width, height)
     structures = structures_of(tensors)
-    module = kernels.load(structures, tensors.compositing, channels)
     order = _draw_order(tensors)
     index = np.repeat(np.arange(len(structures)), list(map(len, tensors.groups)))[order.numpy()]
     hides = COMPOSITING[tensors.compositing].hides
-    canvas = _Canvas(
-        kernels.load_measures(structures), module, index, channels, width, height, *axes, hides=hides
-    )
+    draws = [kernels.drawing(structure, tensors.compositing, channels) for structure in structures]
+    measures = [kernels.measuring(structure) for structure in structures]
+    canvas = _Canvas(measures, draws, index, channels, width, height, *axes, hides=hides)
     return canvas, rows_of(tensors.groups, float(axes[2]))[order]
 
 
@@ -95,8 +95,8 @@ def uniform_rows(group: Group, pixel: float) -> torch.Tensor:
 class _Canvas:
     """What a render needs besides the numbers of the scene."""
 
-    measures: ModuleType
-    module: ModuleType
+    measures: Sequence[tuple[Entry, ...]]  # of each structure
+    draws: Sequence[tuple[Entry, ...]]
     kinds: IntArray  # [L]
     channels: int
     width: int
@@ -132,7 +132,8 @@ def _bin(canvas: _Canvas, rows: Float32Array) -> Bins:
     centers = np.empty((most, 2), np.float32)
     pairs = tiling.list_candidates(bounds, ranges, *place, tiles, layers, spans, centers)
     distances = np.empty(pairs, np.float32)
-    canvas.measures.measure_distances(canvas.kinds, rows, layers, centers, distances)
+    entries = kernels.addresses(canvas.measures)
+    tiling.measure_distances(entries, canvas.kinds, rows, layers, centers, distances)
     pairs = tiling.keep_touching(pairs, distances, bounds, tiles, layers, spans)
     starts = np.zeros(canvas.columns * canvas.rows + 1, np.int64)
     sorted_layers, sorted_spans = np.empty(pairs, np.int32), np.empty((pairs, 2), np.int32)
@@ -143,7 +144,7 @@ def _bin(canvas: _Canvas, rows: Float32Array) -> Bins:
 def _bounds(canvas: _Canvas, rows: Float32Array) -> Float32Array:
     """The bounds of every layer [L, 6]: `kernels.culling`."""
     bounds = np.empty((len(canvas.kinds), tiling.INNER + 1), np.float32)
-    canvas.measures.measure_bounds(canvas.kinds, rows, bounds)
+    tiling.measure_bounds(kernels.addresses(canvas.measures), canvas.kinds, rows, bounds)
     return bounds
 
 
@@ -156,8 +157,9 @@ class _Composite(torch.autograd.Function):
         bins = _bin(canvas, numbers)
         image = np.empty((canvas.channels, canvas.height, canvas.width), np.float32)
         place = (canvas.hides, canvas.x, canvas.y, canvas.columns)
-        shared = (bins.starts, bins.layers, bins.spans, canvas.kinds, numbers, _array(background), *place)
-        in_threads(canvas.module.forward_tiles, *shared, image)
+        layers = (kernels.addresses(canvas.draws), canvas.kinds, numbers)
+        shared = (bins.starts, bins.layers, bins.spans, *layers, _array(background), *place)
+        in_threads(tiling.draw_tiles, *shared, image)
         ctx.canvas, ctx.bins, ctx.shared = canvas, bins, shared
         return torch.from_numpy(image)
 
@@ -165,10 +167,10 @@ class _Composite(torch.autograd.Function):
     @once_differentiable
     def backward(ctx: Any, cotangent: torch.Tensor) -> tuple[torch.Tensor | None, ...]:
         canvas, bins = ctx.canvas, ctx.bins
-        width, longest = ctx.shared[4].shape[1], int(np.diff(bins.starts).max(initial=0))
+        width, longest = ctx.shared[5].shape[1], int(np.diff(bins.starts).max(initial=0))
         grads = np.zeros((len(bins.layers), width), np.float32)
         ground = np.zeros((len(bins.starts) - 1, 4), np.float32)
-        in_threads(canvas.module.backward_tiles, *ctx.shared, _array(cotangent), longest, grads, ground)
+        in_threads(tiling.draw_tiles_backward, *ctx.shared, _array(cotangent), longest, grads, ground)
         totals = np.zeros((len(canvas.kinds), width), np.float64)
         tiling.reduce_pairs(bins.layers, grads, totals)
         background = ground.sum(axis=0, dtype=np.float64)

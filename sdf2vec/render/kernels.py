@@ -1,6 +1,6 @@
 """The fused renderer's kernels: text generated from the same expressions as everything else.
 
-A text holds only the structures of layers that a scene has.
+Every structure of layers is compiled by itself, whatever else a scene has; `tiling` calls it by its address.
 """
 
 from __future__ import annotations
@@ -8,11 +8,14 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import replace
 from functools import cache
-from types import ModuleType
+
+import numpy as np
 
 from .. import kernel_cache
+from ..arrays import IntArray
 from ..expr import Expr, const, var
 from ..graph import components_of, scalarize, walk
+from ..kernel_cache import Entry
 from ..layer import NEVER, PIXEL, Formula, P, Structure
 from ..lower.numba import PREAMBLE, Block, backward, forward, scalar
 from ..operation import VEC4
@@ -30,20 +33,12 @@ def drawn(formula: Formula, name: str, compositing: str, channels: int) -> Block
     return _block(formula, name, formula.draw(BELOW, compositing), channels)
 
 
-def solid_blocks(formulas: Sequence[Formula], compositing: str, channels: int) -> list[Block | None]:
-    """For each structure what a block of pixels becomes that a layer covers wholly; the same one for equal formulas.
-
-    None where colours are mixed.
-    """
-    found: dict[tuple[Expr, ...], Block] = {}
-    blocks: list[Block | None] = []
-    for formula in formulas:
-        block = _block(formula, f"solid{len(found)}", formula.fill(BELOW, compositing), channels)
-        used = set(walk(block.outputs))
-        last = max(index for index, uniform in enumerate(block.uniforms) if uniform in used)
-        block = replace(block, uniforms=block.uniforms[: last + 1])
-        blocks.append(found.setdefault(block.outputs, block) if formula.is_solid else None)
-    return blocks
+def filled(formula: Formula, name: str, compositing: str, channels: int) -> Block:
+    """What a block of pixels becomes that a layer covers wholly: equal for all layers of a paint."""
+    block = _block(formula, name, formula.fill(BELOW, compositing), channels)
+    used = set(walk(block.outputs))
+    last = max(index for index, uniform in enumerate(block.uniforms) if uniform in used)
+    return replace(block, uniforms=block.uniforms[: last + 1])
 
 
 def _block(formula: Formula, name: str, result: Expr, channels: int) -> Block:
@@ -66,54 +61,58 @@ def culling(formula: Formula) -> tuple[Expr, ...]:
     return tuple(scalar for expr in (*box, outer + around, fills) for scalar in scalarize(expr))
 
 
-def text(structures: tuple[Structure, ...], compositing: str, channels: int) -> str:
-    """The module that draws layers of these structures in 3 or 4 channels of colour.
+@cache
+def drawing(structure: Structure, compositing: str, channels: int) -> tuple[Entry, ...]:
+    """`DRAW`, `DRAW_BACKWARD`, `FILL`, `FILL_BACKWARD` of layers of a structure, in 3 or 4 channels of colour.
 
-    A layer's row of numbers is `Formula.uniforms`.
+    A layer's row of numbers is `Formula.uniforms`. The last two stand for the first two where a layer covers a whole
+    tile, in a colour that is not mixed.
     """
-    parts = [PREAMBLE]
-    formulas = [Formula.of(structure) for structure in structures]
-    for index, formula in enumerate(formulas):
-        parts += [
-            f"# {formula}",
-            *_both_ways(drawn(formula, f"layer{index}", compositing, channels), channels),
-        ]
-    solid = solid_blocks(formulas, compositing, channels)
-    for block in dict.fromkeys(block for block in solid if block):
-        parts += _both_ways(block, channels)
-    names = [block.name if block else None for block in solid]
-    driver = template("tiles.py.jinja").render(channels=channels, solid=names)
-    return "\n\n".join([*parts, driver])
-
-
-def measuring_text(structures: tuple[Structure, ...]) -> str:
-    """The module that says where layers of these structures are, whatever they are drawn in."""
-    parts = [PREAMBLE]
-    for index, formula in enumerate(map(Formula.of, structures)):
-        parts += [
-            f"# {formula}",
-            scalar(f"bounds{index}", culling(formula), (), formula.uniforms),
-            scalar(f"distance{index}", scalarize(formula.distance), components_of(P), formula.uniforms),
-        ]
-    return "\n\n".join([*parts, template("measures.py.jinja").render(kinds=len(structures))])
-
-
-def _both_ways(block: Block, channels: int) -> tuple[str, str]:
-    return forward(block, carried(channels)), backward(block, carried(channels))
+    formula = Formula.of(structure)
+    blocks = [drawn(formula, "layer", compositing, channels)]
+    if formula.is_solid:
+        blocks.append(filled(formula, "layer", compositing, channels))
+    modules = [kernel_cache.load(drawing_text(block, channels)) for block in blocks]
+    return tuple(entry for module in modules for entry in (module.draw, module.draw_backward))
 
 
 @cache
-def load(structures: tuple[Structure, ...], compositing: str, channels: int) -> ModuleType:
-    """The compiled module that draws layers of these structures in 3 or 4 channels of colour."""
-    return kernel_cache.load(text(structures, compositing, channels))
+def measuring(structure: Structure) -> tuple[Entry, Entry]:
+    """`BOUNDS` and `DISTANCE` of layers of a structure, whatever they are drawn in."""
+    module = kernel_cache.load(measuring_text(Formula.of(structure)))
+    return module.bounds, module.distance
 
 
-@cache
-def load_measures(structures: tuple[Structure, ...]) -> ModuleType:
-    """The compiled module that says where layers of these structures are."""
-    return kernel_cache.load(measuring_text(structures))
+def drawing_text(block: Block, channels: int) -> str:
+    """The module that draws what a block says on tiles."""
+    driver = template("draw.py.jinja").render(name=block.name, channels=channels, numbers=len(block.uniforms))
+    return "\n\n".join(
+        [PREAMBLE, forward(block, carried(channels)), backward(block, carried(channels)), driver]
+    )
 
 
-def is_compiled(structures: tuple[Structure, ...], compositing: str, channels: int) -> bool:
-    """Whether these kernels have been compiled before on this machine."""
-    return kernel_cache.is_compiled(load(structures, compositing, channels).backward_tiles)
+def measuring_text(formula: Formula) -> str:
+    """The module that says where a layer is."""
+    numbers = formula.uniforms
+    return "\n\n".join(
+        [
+            PREAMBLE,
+            scalar("bounds_of", culling(formula), (), numbers),
+            scalar("distance_at", scalarize(formula.distance), components_of(P), numbers),
+            template("measure.py.jinja").render(numbers=len(numbers)),
+        ]
+    )
+
+
+def addresses(entries: Sequence[tuple[Entry, ...]]) -> IntArray:
+    """Where the entries of each structure are [structures, entries]; compiles what is not."""
+    table = np.zeros((len(entries), max(map(len, entries))), np.int64)
+    for row, each in zip(table, entries, strict=True):
+        row[: len(each)] = [entry.address for entry in each]
+    return table
+
+
+def is_compiled(structures: Sequence[Structure], compositing: str, channels: int) -> bool:
+    """Whether all kernels for layers of these structures have been compiled before on this machine."""
+    entries = [entry for s in structures for entry in (*drawing(s, compositing, channels), *measuring(s))]
+    return all(map(kernel_cache.is_compiled, entries))

@@ -1,10 +1,13 @@
-"""Which layers touch each tile of a canvas, and how tiles meet an image: the compiled loops that know no formula."""
+"""Which layers touch each tile of a canvas, and how tiles are drawn: the compiled loops that know no formula.
+
+What knows one, `kernels` compiles for each structure; it is called by its address.
+"""
 
 from math import ceil, floor
 
 import numpy as np
 
-from ..kernel_cache import inlined, kernel
+from ..kernel_cache import call, inlined, kernel
 from ..layer import ROW_OPACITY
 from ..lower.numba_math import ONE, ZERO, f32
 
@@ -12,6 +15,15 @@ TILE = 16  # pixels along a side of a tile, the block that kernels work on
 PIXELS = TILE * TILE
 MIDDLE = f32((TILE - 1) / 2)  # pixels from the first pixel of a tile to its centre
 LOW_X, LOW_Y, HIGH_X, HIGH_Y, OUTER, INNER = range(6)  # columns of bounds: `kernels.culling`
+DRAW, DRAW_BACKWARD, FILL, FILL_BACKWARD = range(4)  # columns of `kernels.drawing`'s addresses
+BOUNDS, DISTANCE = range(2)  # columns of `kernels.measuring`'s
+
+
+@kernel
+def measure_bounds(entries, kinds, uniforms, bounds):
+    """The bounds of every layer [L, 6]."""
+    for layer in range(kinds.size):
+        call(entries[kinds[layer], BOUNDS], (uniforms[layer], bounds[layer]))
 
 
 @kernel
@@ -52,6 +64,14 @@ def list_candidates(bounds, ranges, x, y, pixel, columns, tiles, layers, spans, 
 
 
 @kernel
+def measure_distances(entries, kinds, uniforms, layers, points, found):
+    """The distance of layer layers[i] at points[i]."""
+    for i in range(found.size):
+        layer = layers[i]
+        call(entries[kinds[layer], DISTANCE], (uniforms[layer], points[i], found[i:]))
+
+
+@kernel
 def keep_touching(count, distances, bounds, tiles, layers, spans):
     """Keeps, in place, the pairs whose layer covers some of the tile, by its distance at the tile's centre; returns
     how many. Rows become (0, 0) where a layer covers all of the tile."""
@@ -88,6 +108,84 @@ def reduce_pairs(layers, grads, totals):
     for q in range(layers.size):
         for i in range(grads.shape[1]):
             totals[layers[q], i] += grads[q, i]
+
+
+@kernel
+def draw_tiles(
+    first, step, starts, layers, spans, entries, kinds, uniforms, background, hides, x, y, columns, image
+):
+    """Draws every step-th tile into image [C, H, W]."""
+    px, py, below = scratch(image.shape[0])
+    kept = np.empty_like(below)
+    for tile in range(first, starts.size - 1, step):
+        top, left = tile // columns * TILE, tile % columns * TILE
+        place_pixels(top, left, x, y, px, py)
+        fill_tile(background, below)
+        start = lowest_visible(starts[tile], starts[tile + 1], layers, spans, uniforms, hides)
+        for q in range(start, starts[tile + 1]):
+            draw(entries, kinds, uniforms, layers[q], spans[q], px, py, below, kept)
+        tile_to_image(top, left, below, image)
+
+
+@kernel
+def draw_tiles_backward(
+    first,
+    step,
+    starts,
+    layers,
+    spans,
+    entries,
+    kinds,
+    uniforms,
+    background,
+    hides,
+    x,
+    y,
+    columns,
+    image_cotangent,
+    longest,
+    grads,
+    background_grads,
+):
+    """Derivatives of every step-th tile: a row of `grads` per pair."""
+    channels = image_cotangent.shape[0]
+    px, py, below = scratch(channels)
+    cotangent = np.empty_like(below)
+    kept = np.empty((longest, channels, PIXELS), f32)
+    for tile in range(first, starts.size - 1, step):
+        top, left = tile // columns * TILE, tile % columns * TILE
+        place_pixels(top, left, x, y, px, py)
+        fill_tile(background, below)
+        start, end = starts[tile], starts[tile + 1]
+        for q in range(start, end):  # what is hidden too: the derivative by what hides it needs it
+            draw(entries, kinds, uniforms, layers[q], spans[q], px, py, below, kept[q - start])
+        image_to_tile(top, left, image_cotangent, cotangent)
+        lowest = lowest_visible(start, end, layers, spans, uniforms, hides)
+        for q in range(end - 1, lowest - 1, -1):
+            layer, span = layers[q], spans[q]
+            first_pixel, end_pixel = pixels_of(span)
+            entry = entries[kinds[layer], FILL_BACKWARD if span[1] == 0 else DRAW_BACKWARD]
+            place = (uniforms[layer], first_pixel, end_pixel, px, py)
+            call(entry, (*place, kept[q - start], cotangent, grads[q]))
+        for c in range(channels):
+            for i in range(PIXELS):
+                background_grads[tile, c] += cotangent[c, i]
+
+
+@inlined
+def draw(entries, kinds, uniforms, layer, span, px, py, below, kept):
+    """Lays a layer on those rows of a tile that it may touch; `kept` takes what was there before."""
+    first, last = pixels_of(span)
+    entry = entries[kinds[layer], FILL if span[1] == 0 else DRAW]
+    call(entry, (uniforms[layer], first, last, px, py, below, kept))
+
+
+@inlined
+def pixels_of(span):
+    """From which pixel of a tile to before which a layer may touch it; its span is (0, 0) where it covers all."""
+    if span[1] == 0:
+        return np.uint64(0), np.uint64(PIXELS)
+    return np.uint64(span[0] * TILE), np.uint64(span[1] * TILE)
 
 
 @inlined

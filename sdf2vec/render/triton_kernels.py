@@ -5,16 +5,18 @@ A text holds only the structures of layers that a scene has.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from functools import cache
 from types import ModuleType
 
 from .. import kernel_cache
+from ..expr import Expr
 from ..graph import components_of, scalarize
 from ..layer import Formula, P, Structure
 from ..lower.block import Block
 from ..lower.triton import PREAMBLE, backward, forward
 from ..templating import template
-from .kernels import carried, culling, drawn, solid_blocks
+from .kernels import carried, culling, drawn, filled
 from .tiling import PIXELS, TILE
 
 MEASURED = 64  # tiles whose distance from a layer is looked at at once
@@ -35,7 +37,7 @@ def text(structures: tuple[Structure, ...], compositing: str, channels: int) -> 
             forward(Block(f"bounds{index}", culling(formula), (), row), rows=True),
             forward(Block(f"distance{index}", scalarize(formula.distance), components_of(P), row), rows=True),
         ]
-    solid = solid_blocks(formulas, compositing, channels)
+    solid = _solid_blocks(formulas, compositing, channels)
     for block in dict.fromkeys(block for block in solid if block):
         parts += _both_ways(block, channels)
     driver = template("tiles.triton.jinja").render(
@@ -49,6 +51,19 @@ def text(structures: tuple[Structure, ...], compositing: str, channels: int) -> 
         reduced=REDUCED,
     )
     return "\n\n".join([*parts, driver])
+
+
+def _solid_blocks(formulas: Sequence[Formula], compositing: str, channels: int) -> list[Block | None]:
+    """What becomes of a tile that a layer of each structure covers wholly; the same one for equal formulas.
+
+    None where colours are mixed.
+    """
+    found: dict[tuple[Expr, ...], Block] = {}
+    blocks: list[Block | None] = []
+    for formula in formulas:
+        block = filled(formula, f"solid{len(found)}", compositing, channels)
+        blocks.append(found.setdefault(block.outputs, block) if formula.is_solid else None)
+    return blocks
 
 
 def _both_ways(block: Block, channels: int) -> tuple[str, str]:

@@ -7,15 +7,15 @@ from hypothesis import strategies as st
 
 from sdf2vec import Layer, Scene, Shape
 from sdf2vec.blend import COMPOSITING, JOINS
-from sdf2vec.layer import Part
+from sdf2vec.layer import Formula, Part
 from sdf2vec.paints import PAINTS
-from sdf2vec.render import draw, fused, kernels, reference
+from sdf2vec.render import draw, fused, kernels, reference, tiling
 from sdf2vec.render.tensors import from_scene
 from sdf2vec.shapes import KINDS
 from tests.render.agreement import VALUES, assert_near_the_reference, outcome
 from tests.scenes import FAMILIES, scene_of
 
-MODULES = [  # each takes half a minute to compile, so not all
+MODULES = [  # every structure takes some seconds to compile, so not all
     *(("plain", "over"), ("plain", "additive"), ("union", "over"), ("cut", "additive")),
     *(("patches", "over"), ("patches", "additive")),
 ]
@@ -112,17 +112,21 @@ def binned(tensors, width, height):
 # --- compiling ---------------------------------------------------------------------------------------------
 
 
-def test_a_text_holds_only_the_structures_it_is_for():
-    text = kernels.text(((Part("circle", "linear"),),), "over", 3)
-    assert "# linear circle" in text
-    assert "linearPaint" not in kernels.text(((Part("circle"),),), "over", 3)
+@pytest.mark.parametrize("structure", [s for structures in FAMILIES.values() for s in structures], ids=str)
+def test_kernel_text_is_plain_python(structure):
+    formula = Formula.of(structure)
+    text = kernels.drawing_text(kernels.drawn(formula, "layer", "over", 4), 4)
+    for source in (text, kernels.measuring_text(formula)):
+        compile(source, "kernels", "exec")
+        assert "{{" not in source
 
 
-def test_kernel_text_is_plain_python():
-    every = tuple(s for structures in FAMILIES.values() for s in structures)
-    text = kernels.text(every, "over", 4) + kernels.measuring_text(every)
-    compile(text, "kernels", "exec")
-    assert "{{" not in text
+def test_structures_are_compiled_by_themselves():
+    """A scene of several needs no other kernels than scenes of each alone; equal paints fill tiles alike."""
+    circle, box = (kernels.drawing((Part(kind),), "over", 3) for kind in ("circle", "box"))
+    assert circle[tiling.DRAW] is not box[tiling.DRAW]
+    assert circle[tiling.FILL] is box[tiling.FILL]
+    assert circle[tiling.FILL] is not kernels.drawing((Part("circle", "linear"),), "over", 3)[tiling.FILL]
 
 
 def test_large_scenes_are_drawn_by_the_fused_renderer_and_look_the_same(monkeypatch):
