@@ -271,11 +271,11 @@ def test_what_is_painted_gains_what_it_should_and_no_other_color_gains_more(weig
     noise = 0.4 + 0.2 * torch.rand((2, 3, 30, 24), generator=seeded())
     weights = torch.rand((30, 24), generator=seeded(1)) if weighted else torch.ones(30, 24)
     canvas = Painted(noise[0], noise[1], weights)
-    radii = torch.tensor([1.0, 4.0])
+    radii = (1.0, 4.0)
     colors, gains = canvas.responses(radii)
 
     def gain(color: torch.Tensor, index: int) -> float:
-        cover = blob(11.5, 14.5, float(radii[index]), [1.0], 24, 30)
+        cover = blob(11.5, 14.5, radii[index], [1.0], 24, 30)
         painted = noise[0] + cover * (color[:, None, None] - noise[0])
         before, after = (((image - noise[1]) * weights).square().sum() for image in (noise[0], painted))
         return float(before - after)
