@@ -43,7 +43,7 @@ PRICE = 0.03  # of a number: the part of a layer's share of the error that it mu
 FIRST_PRICE = 0.004  # while others may follow
 LEAST_GAIN = 0.03  # of the worth of the best layer: with less the search ends
 LEAST_ERROR = 1e-9  # mean square: of a picture that needs no layer
-LEAST_SHARE = 5e-4  # of what is missing without the layer, squared: below it nothing is missing
+LEAST_SHARE = 2e-4  # of what is missing without the layer, squared: below it nothing is missing
 
 Tick = Callable[[float], None]  # told of the error after every step; raises to stop
 
