@@ -13,7 +13,7 @@ from torch.optim.adam import adam as adam_step
 
 from ..units import Unit
 
-BETAS = (0.9, 0.99)
+BETAS = (0.9, 0.9)
 EPSILON = 1e-12
 
 
@@ -56,7 +56,7 @@ class Moving:
 
 
 class Adam:
-    """Adam (Kingma and Ba 2015) with β₁ = 0.9, β₂ = 0.99."""
+    """Adam (Kingma and Ba 2015) with β₁ = β₂ = 0.9: a shape that moves soon meets other slopes."""
 
     def __init__(self, rates: Iterable[tuple[torch.Tensor, float]]) -> None:
         self.moving = [Moving.of(tensor, rate) for tensor, rate in rates]
@@ -71,6 +71,14 @@ class Adam:
         """One step, all rates scaled by a factor."""
         for moving in self.moving:
             moving.step(factor)
+
+    def remembers(self, before: Adam) -> Adam:
+        """Itself, with what another remembers of the same tensors."""
+        old = {id(moving.tensor): moving for moving in before.moving}
+        for moving in self.moving:
+            if same := old.get(id(moving.tensor)):
+                moving.mean, moving.square, moving.steps = same.mean, same.square, same.steps
+        return self
 
     def replace(self, before: torch.Tensor, after: torch.Tensor, rows: torch.Tensor) -> None:
         """Puts a tensor in another's place: its first rows are these of the other; the rest's running means are 0."""

@@ -101,6 +101,7 @@ class Fit:
         self.pixels = picture.premultiplied
         self.pixel = 1.0 / min(picture.width, picture.height)
         self.size = (picture.width * self.pixel, picture.height * self.pixel)
+        self.wanted = settings.shapes // settings.union  # layers
         self.done, self.steps, self.stopped = 0, self._count_steps(), False
         self.tensors = self._start()
         self._announce_compiling()
@@ -153,7 +154,8 @@ class Fit:
         target = scaled(self.pixels, self._resolution(self.phases[0]))
         settings, layers = self.settings, _layers_of(self.settings)
         if settings.start is None:
-            count = settings.shapes // settings.union
+            growth = self.phases[0].growth
+            count = growth.count(0, self.phases[0].steps, self.wanted) if growth else self.wanted
             return place(target, self.size, layers, count, self.preset.start, self.generator)
         _check_start(settings.start, self.size)
         tensors = replace(from_scene(settings.start), size=self.size)
@@ -177,11 +179,25 @@ class Fit:
         count = (self.settings.shapes - tensors.shape_count) // self.settings.union
         if count > 0:
             image = fused.composite(tensors, target.shape[2], target.shape[1], len(target))
-            layers, full = _layers_of(self.settings), tensors.layer_count + count
-            _add(tensors, optimizer, densify(image, target, count, tensors, layers, self.generator))
-            rest = full - tensors.layer_count
-            if rest > 0:
-                _add(tensors, optimizer, self._anywhere(target, rest, tensors.layer_count))
+            self._add(tensors, optimizer, image, target, count)
+
+    def _add(
+        self,
+        tensors: SceneTensors,
+        optimizer: Adam,
+        image: torch.Tensor,
+        target: torch.Tensor,
+        count: int,
+        weights: torch.Tensor | None = None,
+    ) -> None:
+        """New layers where they help most; anywhere, when none would help."""
+        layers, full = _layers_of(self.settings), tensors.layer_count + count
+        _join_groups(
+            tensors, optimizer, densify(image, target, count, tensors, layers, self.generator, weights)
+        )
+        rest = full - tensors.layer_count
+        if rest > 0:
+            _join_groups(tensors, optimizer, self._anywhere(target.cpu(), rest, tensors.layer_count))
 
     def _anywhere(self, target: torch.Tensor, count: int, first: int) -> list[Group]:
         """New layers anywhere, in the picture's colours, their draw order beginning with `first`."""
@@ -216,6 +232,8 @@ class Fit:
         """The steps of a phase; `moves` tells which layers of a group are trained, all without it."""
         phase = stage.phase
         for step, rate in enumerate(_rates(phase)):
+            if phase.growth is not None and self.settings.start is None:
+                self._grow(stage, phase.growth.count(step, phase.steps, self.wanted))
             if phase.relocation is not None and phase.relocation.is_due(step, phase.steps):
                 self._relocate(stage, phase.relocation.share)
             loss = self._step(stage, rate, moves)
@@ -304,6 +322,14 @@ class Fit:
         fresh = densify(image, stage.target, count, self.tensors, layers, self.generator, stage.weights)
         relocate(self.tensors, self.optimizer, scores, fresh)
 
+    def _grow(self, stage: Stage, count: int) -> None:
+        """New layers up to this number, and all rates for that."""
+        count -= self.tensors.layer_count
+        if count > 0:
+            image = self._draw(self.tensors, stage.target)
+            self._add(self.tensors, self.optimizer, image, stage.target, count, stage.weights)
+            self.optimizer = self._adam().remembers(self.optimizer)
+
     @property
     def _replaceable(self) -> int:
         """How many layers are of as many shapes as new ones, so that the number of shapes stays."""
@@ -318,7 +344,7 @@ class Fit:
         ]
 
 
-def _add(tensors: SceneTensors, optimizer: Adam, fresh: list[Group]) -> None:
+def _join_groups(tensors: SceneTensors, optimizer: Adam, fresh: list[Group]) -> None:
     exchange(tensors, optimizer, [torch.arange(len(group)) for group in tensors.groups], fresh)
 
 

@@ -33,6 +33,23 @@ class Relocation:
 
 
 @dataclass(frozen=True)
+class Growth:
+    """A fit begins with `first` layers; every so many steps there are twice as many, until all are there.
+
+    Sooner where the phase would end before that.
+    """
+
+    first: int
+    every: int
+
+    def count(self, step: int, steps: int, full: int) -> int:
+        """How many layers of `full` there are to be at this step of a phase of so many."""
+        doublings = max(0, math.ceil(math.log2(full / self.first)))
+        every = min(self.every, steps // (doublings + 1))
+        return full if step >= doublings * every else self.first << step // every
+
+
+@dataclass(frozen=True)
 class Phase:
     """A stretch of the fit at one resolution.
 
@@ -48,6 +65,7 @@ class Phase:
     end_rate: float = 1.0
     loss: Loss = L1
     relocation: Relocation | None = None
+    growth: Growth | None = None
     batches: int = 1
 
     @property
@@ -96,28 +114,28 @@ class Preset:
         return sum(phase.total for phase in self.phases)
 
 
-L1_FLIP: Loss = (("l1", 1.0), ("flip", 0.2))
+MSE_FLIP: Loss = (("mse", 10.0), ("flip", 0.2))
 OFTEN = Relocation(every=25, share=0.05)
 
 PRESETS: dict[str, Preset] = {
     "fast": Preset(
         (
-            Phase("coarse", 200, 64, relocation=OFTEN),
+            Phase("coarse", 200, 64, relocation=OFTEN, growth=Growth(64, 25)),
             Phase("fine", 120, 160, rate=0.6, end_rate=0.03),
         )
     ),
     "balanced": Preset(
         (
-            Phase("coarse", 300, 96, relocation=OFTEN),
-            Phase("middle", 250, 128, rate=0.8, end_rate=0.4, relocation=OFTEN),
-            Phase("fine", 120, 320, rate=0.4, end_rate=0.02, loss=L1_FLIP),
+            Phase("coarse", 300, 96, relocation=OFTEN, growth=Growth(64, 40)),
+            Phase("middle", 250, 128, rate=0.8, end_rate=0.6, relocation=OFTEN),
+            Phase("fine", 120, 320, rate=0.6, end_rate=0.02, loss=MSE_FLIP),
         )
     ),
     "best": Preset(
         (
-            Phase("coarse", 600, 96, relocation=OFTEN),
-            Phase("middle", 800, 192, rate=0.8, end_rate=0.4, relocation=OFTEN),
-            Phase("fine", 400, 512, rate=0.4, end_rate=0.02, loss=L1_FLIP),
+            Phase("coarse", 600, 96, relocation=OFTEN, growth=Growth(64, 40)),
+            Phase("middle", 800, 192, rate=0.8, end_rate=0.6, relocation=OFTEN),
+            Phase("fine", 400, 512, rate=0.6, end_rate=0.02, loss=MSE_FLIP),
         )
     ),
     # Of the thesis. It leaves open: where shapes start (anywhere), the size of a batch (a quarter of the layers), the

@@ -10,14 +10,15 @@ from sdf2vec.fit import growth
 from sdf2vec.fit.adam import Adam
 from sdf2vec.fit.growth import densify, exchange, importance, prune
 from sdf2vec.fit.initialization import Layers, Places, empty_groups, groups_at
-from sdf2vec.fit.loop import adam
+from sdf2vec.fit.loop import Fit, adam
 from sdf2vec.fit.matching_pursuit import WIDTH, Missing, Painted, find_discs
-from sdf2vec.fit.presets import Relocation
+from sdf2vec.fit.presets import PRESETS, Growth, Phase, Preset, Relocation
+from sdf2vec.fit.settings import settings_of
 from sdf2vec.image import Picture, load, resize
 from sdf2vec.layer import Part
 from sdf2vec.render.reference import composite
 from sdf2vec.render.tensors import Group, from_scene, to_scene
-from tests.fit.fitting import error, fitted
+from tests.fit.fitting import error, fitted, picture
 from tests.scenes import random_scene
 
 
@@ -366,6 +367,59 @@ def test_relocation_is_due_in_the_middle_of_its_stretches():
     """By hand: every 10, from 5 on, while less than 80 % of 50 steps are done."""
     assert [s for s in range(50) if Relocation(10, 0.1).is_due(s, 50)] == [5, 15, 25, 35]
     assert [s for s in range(50) if Relocation(20, 0.1, until=1.0).is_due(s, 50)] == [10, 30]
+
+
+# --- from few to all ---------------------------------------------------------------------------------------
+
+
+def test_layers_double_until_all_are_there():
+    """By hand: 4, 8, 16, then all 20; all from the start where they are few."""
+    assert [Growth(4, 10).count(step, 100, 20) for step in (0, 9, 10, 19, 20, 29, 30, 99)] == [
+        *(4, 4, 8, 8, 16, 16, 20, 20)
+    ]
+    assert [Growth(4, 10).count(step, 100, full) for full in (1, 4, 8) for step in (0, 10)] == [
+        *(1, 1, 4, 4, 4, 8)
+    ]
+
+
+@pytest.mark.parametrize("steps", [1, 3, 20, 200])
+@pytest.mark.parametrize("full", [5, 64, 100, 8192])
+def test_all_layers_are_there_before_a_phase_ends(steps, full):
+    counts = [Growth(4, 30).count(step, steps, full) for step in range(steps)]
+    assert counts == sorted(counts)
+    assert counts[-1] == full
+    assert counts[0] == (full if steps < 3 else counts[0])
+
+
+@pytest.mark.parametrize(("shapes", "union"), [(1, 1), (9, 1), (30, 1), (60, 2)])
+def test_a_fit_that_grows_ends_with_all_shapes(monkeypatch, shapes, union):
+    growing = Phase("all", 40, 24, growth=Growth(4, 5), relocation=Relocation(6, 0.2, until=0.5))
+    monkeypatch.setitem(PRESETS, "fast", Preset((growing,)))
+    settings = settings_of(shapes, kind="circle", preset="fast", union=union)
+    drawn: list[int] = []
+
+    def look(progress: object) -> bool:
+        drawn.append(fit.tensors.layer_count)
+        return False
+
+    fit = Fit(picture(), settings, look)
+    assert fit.tensors.layer_count == min(4, shapes // union)
+    fit.run()
+    assert sorted(set(drawn)) == sorted({min(count, shapes // union) for count in (4, 8, 16, 30)})
+    assert (drawn[0], drawn[-1]) == (min(4, shapes // union), shapes // union)
+
+
+def test_what_is_known_of_old_layers_stays_and_rates_are_of_the_new_number():
+    scene = Scene(24, 24, tuple(Layer((Shape("circle", (0, 0, 0.2), (1, 0, 0)),), 0.1) for _ in range(3)))
+    few = adam(from_scene(scene))
+    for moving in few.moving:
+        moving.mean += 2.0
+    tensors = from_scene(scene)
+    for group in tensors.groups:
+        group.values = {slot: few.moving[i].tensor for i, slot in enumerate(group.values)}
+    many = adam(tensors).remembers(few)
+    assert [float(moving.mean.mean()) for moving in many.moving[:-1]] == [2.0] * (len(many.moving) - 1)
+    assert float(many.moving[-1].mean.mean()) == 0.0  # a background that is another tensor
 
 
 def test_more_shapes_are_never_worse():
