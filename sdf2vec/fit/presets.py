@@ -120,15 +120,15 @@ OFTEN = Relocation(every=25, share=0.05)
 PRESETS: dict[str, Preset] = {
     "fast": Preset(
         (
-            Phase("coarse", 200, 64, relocation=OFTEN, growth=Growth(64, 25)),
-            Phase("fine", 120, 160, rate=0.6, end_rate=0.03),
+            Phase("coarse", 240, 64, relocation=OFTEN, growth=Growth(64, 25)),
+            Phase("fine", 140, 160, rate=0.6, end_rate=0.03, loss=MSE),
         )
     ),
     "balanced": Preset(
         (
             Phase("coarse", 300, 96, relocation=OFTEN, growth=Growth(64, 40)),
-            Phase("middle", 250, 128, rate=0.8, end_rate=0.6, relocation=OFTEN),
-            Phase("fine", 120, 320, rate=0.6, end_rate=0.02, loss=MSE_FLIP),
+            Phase("middle", 330, 128, rate=0.8, end_rate=0.6, relocation=OFTEN),
+            Phase("fine", 180, 320, rate=0.6, end_rate=0.02, loss=MSE_FLIP),
         )
     ),
     "best": Preset(
