@@ -114,28 +114,29 @@ class Preset:
         return sum(phase.total for phase in self.phases)
 
 
-MSE_FLIP: Loss = (("mse", 10.0), ("flip", 0.2))
+L1_MSE: Loss = (("l1", 1.0), ("mse", 10.0))
+L1_MSE_FLIP: Loss = (*L1_MSE, ("flip", 0.2))
 OFTEN = Relocation(every=25, share=0.05)
 
 PRESETS: dict[str, Preset] = {
     "fast": Preset(
         (
             Phase("coarse", 240, 64, relocation=OFTEN, growth=Growth(64, 25)),
-            Phase("fine", 140, 160, rate=0.6, end_rate=0.03, loss=MSE),
+            Phase("fine", 140, 160, rate=0.6, end_rate=0.03, loss=L1_MSE),
         )
     ),
     "balanced": Preset(
         (
             Phase("coarse", 300, 96, relocation=OFTEN, growth=Growth(64, 40)),
             Phase("middle", 330, 128, rate=0.8, end_rate=0.6, relocation=OFTEN),
-            Phase("fine", 180, 320, rate=0.6, end_rate=0.02, loss=MSE_FLIP),
+            Phase("fine", 180, 320, rate=0.6, end_rate=0.02, loss=L1_MSE_FLIP),
         )
     ),
     "best": Preset(
         (
             Phase("coarse", 600, 96, relocation=OFTEN, growth=Growth(64, 40)),
             Phase("middle", 800, 192, rate=0.8, end_rate=0.6, relocation=OFTEN),
-            Phase("fine", 400, 512, rate=0.6, end_rate=0.02, loss=MSE_FLIP),
+            Phase("fine", 400, 512, rate=0.6, end_rate=0.02, loss=L1_MSE_FLIP),
         )
     ),
     # Of the thesis. It leaves open: where shapes start (anywhere), the size of a batch (a quarter of the layers), the

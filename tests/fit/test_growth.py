@@ -190,7 +190,7 @@ def test_a_group_may_lose_all_rows_and_a_new_kind_may_come():
 def test_adam_is_torchs_own():
     start, pull = torch.tensor([1.0, -2.0]), torch.tensor([0.3, 4.0])
     ours, theirs = start.clone(), start.clone().requires_grad_()
-    optimizer, other = Adam([(ours, 0.05)]), torch.optim.Adam([theirs], lr=0.05, betas=(0.9, 0.99), eps=1e-12)
+    optimizer, other = Adam([(ours, 0.05)]), torch.optim.Adam([theirs], lr=0.05, betas=(0.9, 0.9), eps=1e-12)
     for _ in range(5):
         for tensor, one in ((ours, optimizer), (theirs, other)):
             one.zero_grad()
