@@ -115,7 +115,7 @@ class Preset:
 
 
 L1_MSE: Loss = (("l1", 1.0), ("mse", 10.0))
-L1_MSE_FLIP: Loss = (*L1_MSE, ("flip", 0.2))
+L1_MSE_FLIP: Loss = (("l1", 1.0), ("mse", 5.0), ("flip", 0.4))
 OFTEN = Relocation(every=25, share=0.05)
 
 PRESETS: dict[str, Preset] = {
