@@ -148,14 +148,15 @@ class _Kept(caching.NullCache):
         self.function = function
 
     def load_overload(self, signature: object, target: Any) -> Any:
-        """What was compiled for a signature; None where there is nothing, or it is damaged."""
+        """What was compiled for a signature; None where there is nothing, or it is damaged, or made of a module whose
+        name is another now: a remark in generated text is enough for that."""
         target.refresh()
         try:
             data = self._path(signature, target.codegen()).read_bytes()
             if hashlib.sha256(data[DIGEST:]).digest() != data[:DIGEST]:
                 return None
             return compiler.CompileResult._rebuild(target, *pickle.loads(data[DIGEST:]))
-        except OSError:
+        except (OSError, ImportError):
             return None
 
     def save_overload(self, signature: object, compiled: Any) -> None:

@@ -50,6 +50,24 @@ def test_damaged_machine_code_is_compiled_anew(tmp_path, damage):
     assert run(RUN, tmp_path).stdout.split()[-1] == "1"  # it was kept again
 
 
+CALLS_A_MODULE = """
+import sys
+from sdf2vec import kernel_cache
+source = "from sdf2vec.kernel_cache import inlined\\n@inlined\\ndef twice(x):\\n    return 2 * x\\n"
+twice = kernel_cache.load(source + sys.argv[1]).twice
+@kernel_cache.kernel
+def f(x):
+    return twice(x)
+print(f(1), len(f.stats.cache_hits))
+"""
+
+
+def test_machine_code_of_a_module_that_is_gone_is_compiled_anew(tmp_path):
+    """Another version's text may say the same in other words: the module has another name then."""
+    runs = [run(CALLS_A_MODULE, tmp_path, remark).stdout.split() for remark in ("", "", "# other", "# other")]
+    assert runs == [["2", "0"], ["2", "1"], ["2", "0"], ["2", "1"]]
+
+
 def test_without_a_cache_folder_kernels_work_with_one_warning(tmp_path):
     (tmp_path / "file").write_text("not a folder")
     result = run(RUN, tmp_path / "file" / "inside")
