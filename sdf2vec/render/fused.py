@@ -46,7 +46,7 @@ def _canvas(tensors: SceneTensors, width: int, height: int, channels: int) -> tu
     index = np.repeat(np.arange(len(structures)), list(map(len, tensors.groups)))[order.numpy()]
     hides = COMPOSITING[tensors.compositing].hides
     draws = [kernels.drawing(structure, tensors.compositing, channels) for structure in structures]
-    measures = [kernels.measuring(structure) for structure in structures]
+    measures = kernels.addresses([kernels.measuring(structure) for structure in structures])
     canvas = _Canvas(measures, draws, index, channels, width, height, *axes, hides=hides)
     return canvas, rows_of(tensors.groups, float(axes[2]))[order]
 
@@ -95,8 +95,8 @@ def uniform_rows(group: Group, pixel: float) -> torch.Tensor:
 class _Canvas:
     """What a render needs besides the numbers of the scene."""
 
-    measures: Sequence[tuple[Entry, ...]]  # of each structure
-    draws: Sequence[tuple[Entry, ...]]
+    measures: IntArray  # where the entries of each structure are
+    draws: Sequence[tuple[Entry, ...]]  # of each structure; compiled when something is drawn
     kinds: IntArray  # [L]
     channels: int
     width: int
@@ -132,8 +132,7 @@ def _bin(canvas: _Canvas, rows: Float32Array) -> Bins:
     centers = np.empty((most, 2), np.float32)
     pairs = tiling.list_candidates(bounds, ranges, *place, tiles, layers, spans, centers)
     distances = np.empty(pairs, np.float32)
-    entries = kernels.addresses(canvas.measures)
-    tiling.measure_distances(entries, canvas.kinds, rows, layers, centers, distances)
+    tiling.measure_distances(canvas.measures, canvas.kinds, rows, layers, centers, distances)
     pairs = tiling.keep_touching(pairs, distances, bounds, tiles, layers, spans)
     starts = np.zeros(canvas.columns * canvas.rows + 1, np.int64)
     sorted_layers, sorted_spans = np.empty(pairs, np.int32), np.empty((pairs, 2), np.int32)
@@ -144,7 +143,7 @@ def _bin(canvas: _Canvas, rows: Float32Array) -> Bins:
 def _bounds(canvas: _Canvas, rows: Float32Array) -> Float32Array:
     """The bounds of every layer [L, 6]: `kernels.culling`."""
     bounds = np.empty((len(canvas.kinds), tiling.INNER + 1), np.float32)
-    tiling.measure_bounds(kernels.addresses(canvas.measures), canvas.kinds, rows, bounds)
+    tiling.measure_bounds(canvas.measures, canvas.kinds, rows, bounds)
     return bounds
 
 
