@@ -21,6 +21,7 @@ LONGEST = 1.5  # longest sides of the canvas
 HIGHEST_FREQUENCY = 60.0  # radians per scene unit
 STEEPEST = 4.0  # of a gradient: ranges of colour across half a shape
 FAINTEST = 0.02  # opacity where colours are not signed: below it a shape would stop learning
+GRAIN = 0.001  # scene units: falloffs much below it are packed in equal steps
 GEOMETRY_DECIMALS = 6
 COLOR_DECIMALS = 5
 
@@ -54,16 +55,22 @@ class Fractions(NamedTuple):
     ranges: Mapping[str, tuple[float, float]]
 
 
+def _itself(value: float) -> float:
+    return value
+
+
 @dataclass(frozen=True)
 class Codec:
-    """How a packed scene says a number: `decode` gives its value from a fraction 0..1, as a polynomial of this `power`.
+    """How a packed scene says a number: `decode` gives its value from a fraction 0..1.
 
-    `precision`: whose bits it has: "place" (as many as the layer's edge needs) or those of a field of its own.
+    `precision`: whose bits it has: "place" (as many as the layer's edge needs) or those of a field of its own. The
+    `root` of a value is linear in its fraction; `value` is that of a root.
     """
 
     decode: Callable[[Expr, Fractions], Expr]
     precision: str = "place"
-    power: int = 1
+    root: Callable[[float], float] = _itself
+    value: Callable[[float], float] = _itself
 
 
 @dataclass(frozen=True, eq=False)
@@ -193,11 +200,26 @@ def _keep_falloff(values: Any, positive: bool, room: Room) -> None:
 # --- how a packed scene says them ----------------------------------------------------------------------------
 
 
-@function("grown", v=FLOAT, largest=FLOAT)
-def grown(v: Expr, largest: Expr) -> Expr:
-    """A length from its fraction, finer near 0."""
-    square = let("square", v * v)
-    return square * square * largest
+ROOT = 16
+
+
+@function("grown", root=FLOAT)
+def grown(root: Expr) -> Expr:
+    """A length from its root: its 16th power, so that steps are shares of it, but equal where it is below `GRAIN`."""
+    power = root
+    for name in ("square", "fourth", "eighth"):
+        power = let(name, power * power)
+    return power * power - GRAIN
+
+
+def _grown(root: float) -> float:
+    power: float = root**ROOT
+    return power - GRAIN
+
+
+def _root(length: float) -> float:
+    root: float = (length + GRAIN) ** (1.0 / ROOT)
+    return root
 
 
 def _place_in_box(v: Expr, of: Fractions) -> Expr:
@@ -221,8 +243,14 @@ def _between(unit: str) -> Callable[[Expr, Fractions], Expr]:
     return decode
 
 
-def _up_to(unit: str) -> Callable[[Expr, Fractions], Expr]:
-    return lambda v, of: grown(v, const(of.ranges[unit][1]))
+def _grown_between(unit: str) -> Callable[[Expr, Fractions], Expr]:
+    """A length between the least and the largest of the scene, in steps that are the larger the longer it is."""
+
+    def decode(v: Expr, of: Fractions) -> Expr:
+        low, high = map(_root, of.ranges[unit])
+        return grown(low + v * (high - low))
+
+    return decode
 
 
 _PLACE, _SPAN = Codec(_place_in_box), Codec(_share_of_span)
@@ -291,7 +319,7 @@ FALLOFF = Unit(
     LONGEST_CANVAS,
     0.01,
     _keep_falloff,
-    Codec(_up_to("falloff"), "falloff", 4),
+    Codec(_grown_between("falloff"), "falloff", _root, _grown),
     scaling=1,
     crowded=True,
 )
@@ -301,7 +329,7 @@ SMOOTHNESS = Unit(
     LONGEST_CANVAS,
     0.003,
     _keep_within(1e-3, LONGEST),
-    Codec(_up_to("smoothness"), "falloff", 4),
+    Codec(_grown_between("smoothness"), "falloff", _root, _grown),
     scaling=1,
     crowded=True,
 )

@@ -14,6 +14,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, replace
+from functools import cache, partial
 
 import numpy as np
 import torch
@@ -45,12 +46,18 @@ CHOICE_BITS = 3  # say how many more bits than the least a layer's fractions hav
 COUNT_BITS = 7  # of the number of shapes in a layer
 LEAST_BITS, MOST_BITS = 4, 24  # of a fraction; a float holds no more
 FEWER = 5  # bits that all layers begin without, when the fewest are looked for
-ROUNDS = 24
+ROUNDS = 60
+BLAME = (
+    0.97  # of the largest share that a layer has in what is off at a pixel: who has so much gets more bits
+)
 WORST = 4096  # pixels that are looked at in each round
 FAINT = 0.05  # opacity below which layers are not told apart
 PLACE = "place"  # the precision of what lies in a layer's box: bits by how sharp its edge is
 
 Limits = tuple[float, float]
+Ends = tuple[
+    list[float], list[float]
+]  # of the components of a parameter: where its fractions are 0, and where 1
 
 CORNER, BOX = var("corner", VEC2), var("box", VEC2)
 
@@ -152,8 +159,9 @@ def _fewest_bits(
         off = np.abs(view.picture(packer.quantised(precision, counts.tolist())) - picture).max(axis=0) * 255.0
         if off.max() <= limit:
             return counts.tolist(), float(off.max())
-        worst = np.argsort(-off, kind="stable")[:WORST]
-        counts[packer.to_blame(view, worst[off[worst] > limit], counts)] += 1
+        wrong = np.nonzero(off > limit)[0]
+        worst = wrong[np.argsort(-off[wrong], kind="stable")[:WORST]]
+        counts[packer.to_blame(view, worst, counts)] += 1
         counts = np.minimum(counts, MOST_BITS)
     return None
 
@@ -215,6 +223,7 @@ class _Packer:
         self.layout = Layout(self.variants, self.joins)
         self.grid, self.cells = _cell_boxes(scene, slack)
         self.finest = min(CANVAS)
+        self._ends = cache(lambda cells, parameter: _ends_of(parameter, self.ranges, *self._box(cells)))
 
     def quantised(self, precision: Precision, counts: Sequence[int]) -> Scene:
         """The scene as a shader will read it, with so many bits for the fractions of each layer."""
@@ -253,7 +262,7 @@ class _Packer:
         cover = np.abs(view.coverages(self.scene, chosen))
         steep = np.array([self._steepness(*pair) for pair in zip(self.scene.layers, self.cells, strict=True)])
         share = cover * (1.0 - cover) * (steep * 0.5**counts)[:, None]
-        guilty = (share >= 0.5 * share.max(axis=0)) & (share > 0.0)
+        guilty = (share >= BLAME * share.max(axis=0)) & (share > 0.0)
         return np.nonzero(guilty.any(axis=1))[0]
 
     def pack(self, precision: Precision, counts: Sequence[int], error: float) -> Packed:
@@ -273,7 +282,7 @@ class _Packer:
         self, layer: Layer, cells: tuple[int, ...], count: int, precision: Precision
     ) -> tuple[list[tuple[int, int]], Layer]:
         """The numbers of a layer with their bits, and the layer that they say."""
-        coder = _Coder(self.ranges, *self._box(cells), precision, count)
+        coder = _Coder(partial(self._ends, cells), precision, count)
         if self.joins:
             coder.whole(len(layer.shapes) - 1, COUNT_BITS)
         else:
@@ -319,6 +328,18 @@ class _Packer:
         return (low[0], low[1]), (high[0] - low[0], high[1] - low[1])
 
 
+def _ends_of(parameter: Parameter, ranges: Ranges, corner: Limits, box: Limits) -> Ends:
+    """What all fractions 0, and all fractions 1, of a parameter of a layer stand for."""
+    names = (*components_of(CORNER), *components_of(BOX))
+    known = dict(zip(names, map(const, (*corner, *box)), strict=True))
+
+    def at(end: float) -> list[float]:
+        meaning = decoded(parameter, [const(end)] * parameter.width, ranges)
+        return [constant(substitute(scalar, known)) for scalar in scalarize(meaning)]
+
+    return at(0.0), at(1.0)
+
+
 def _by_parameter(shape: Shape) -> dict[Parameter, list[float]]:
     """All numbers of a shape by what they are."""
     rest = iter((*shape.color, *shape.paint_parameters, *shape.parameters))
@@ -334,12 +355,10 @@ def by_precision(parameters: Iterable[Parameter]) -> list[Parameter]:
 class _Coder:
     """Collects whole numbers with their bits, for one layer; each method returns the value that its number says."""
 
-    def __init__(self, ranges: Ranges, corner: Limits, box: Limits, precision: Precision, count: int) -> None:
+    def __init__(self, ends: Callable[[Parameter], Ends], precision: Precision, count: int) -> None:
         self.numbers: list[tuple[int, int]] = []
         self.bits = 0
-        self.ranges, self.precision, self.count = ranges, precision, count
-        names = (*components_of(CORNER), *components_of(BOX))
-        self._known = dict(zip(names, map(const, (*corner, *box)), strict=True))
+        self.ends, self.precision, self.count = ends, precision, count
 
     def whole(self, value: int, bits: int) -> int:
         self.numbers.append((value, bits))
@@ -360,23 +379,16 @@ class _Coder:
         """All components of a parameter."""
         codec = parameter.unit.codec
         bits = self.count if codec.precision == PLACE else getattr(self.precision, codec.precision)
-        lows, highs = (self._ends(parameter, end) for end in (0.0, 1.0))
-        return [
-            _legal(low + (high - low) * self._fraction(value, low, high, bits, parameter), parameter)
-            for value, low, high in zip(values, lows, highs, strict=True)
-        ]
+        ends = zip(values, *self.ends(parameter), strict=True)
+        return [_legal(self._said(value, low, high, bits, parameter), parameter) for value, low, high in ends]
 
-    def _fraction(self, value: float, low: float, high: float, bits: int, parameter: Parameter) -> float:
-        power, most = parameter.unit.codec.power, (1 << bits) - 1
+    def _said(self, value: float, low: float, high: float, bits: int, parameter: Parameter) -> float:
+        """What the fraction with so many bits stands for that comes nearest to a value."""
+        codec, most = parameter.unit.codec, (1 << bits) - 1
         value = value % math.tau if parameter.unit is ANGLE else value
-        share = min(max((value - low) / (high - low), 0.0), 1.0) if high > low else 0.0
-        fraction: float = self.whole(round(share ** (1 / power) * most), bits) / most
-        return fraction**power
-
-    def _ends(self, parameter: Parameter, end: float) -> list[float]:
-        """What all fractions 0, or all fractions 1, stand for."""
-        meaning = decoded(parameter, [const(end)] * parameter.width, self.ranges)
-        return [constant(substitute(scalar, self._known)) for scalar in scalarize(meaning)]
+        start, end, root = (codec.root(v) for v in (low, high, value))
+        share = min(max((root - start) / (end - start), 0.0), 1.0) if end > start else 0.0
+        return codec.value(start + (end - start) * self.whole(round(share * most), bits) / most)
 
 
 def _legal(value: float, parameter: Parameter) -> float:

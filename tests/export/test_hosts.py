@@ -171,7 +171,7 @@ def test_the_default_shadertoy_of_256_shapes(photo, require_engine):
     scene = photo
     made = shader(scene, "shadertoy", Options(title="coffee"))
     assert made.choice.layout == "packed"
-    assert len(made.text.encode()) <= 15_600
+    assert len(made.text.encode()) <= 15_360  # 15 KiB
     uniforms = {"iResolution": (960.0, 540.0, 1.0)}
     drawn = opengl.render(SHADERTOY_HEAD + made.text + SHADERTOY_TAIL, 960, 540, uniforms)
     assert levels(drawn, rendered(scene, 960, 540)) <= 1.0
