@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Sequence
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Literal
 
 from .declared import checked, documented
 from .deferred import deferred
@@ -15,25 +15,37 @@ from .scene import Scene
 
 if TYPE_CHECKING:
     from .arrays import Float32Array
+    from .fit.auto import Fitted
     from .fit.loop import Progress
     from .image import Picture
     from .roundtrip import Check, Size
 
 _load_picture: Callable[[Any], Picture] = deferred("sdf2vec.image", "load")
-_fit_picture: Callable[..., Scene] = deferred("sdf2vec.fit.loop", "fit_picture")
+_fitted_picture: Callable[..., Fitted] = deferred("sdf2vec.fit.auto", "fitted_picture")
 _render: Callable[..., Float32Array] = deferred("sdf2vec.render.draw", "pixels_of")
 _check: Callable[..., list[Check]] = deferred("sdf2vec.roundtrip", "check")
 
 
-@documented(Settings)
 def fit(
     image: Any,
-    shapes: int | None = None,
+    shapes: int | Literal["auto"] | None = None,
     *,
     callback: Callable[[Progress], bool] | None = None,
     **options: Any,
 ) -> Scene:
-    """Fits `shapes` shapes to a picture.
+    """Fits `shapes` shapes to a picture, no more than it needs unless told: the scene of `fitted`."""
+    return fitted(image, shapes, callback=callback, **options).scene
+
+
+@documented(Settings)
+def fitted(
+    image: Any,
+    shapes: int | Literal["auto"] | None = None,
+    *,
+    callback: Callable[[Progress], bool] | None = None,
+    **options: Any,
+) -> Fitted:
+    """Fits shapes to a picture, and tells what was decided about their number and whether a target was met.
 
     `image`: a path, bytes, a file object, a PIL image or an array [H, W], [H, W, 3] or [H, W, 4] (sRGB-coded;
     integers, or floats 0..1). `callback` is called with the progress after every step and ends the fit by returning
@@ -41,7 +53,7 @@ def fit(
     weight. Raises Sdf2vecError for anything that can't be fitted.
     """
     settings = settings_of(shapes, **options)
-    return _fit_picture(_load_picture(image), settings, callback or (lambda progress: False))
+    return _fitted_picture(_load_picture(image), settings, callback or (lambda progress: False))
 
 
 def render(scene: Scene, width: int | None = None, height: int | None = None) -> Float32Array:

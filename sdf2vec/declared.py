@@ -12,7 +12,7 @@ from dataclasses import dataclass
 from functools import cache
 from numbers import Integral, Real
 from types import NoneType
-from typing import Any, TypeVar, get_args, get_type_hints
+from typing import Any, Literal, TypeVar, get_args, get_origin, get_type_hints
 
 import msgspec
 
@@ -41,13 +41,17 @@ def plain(description: str, metavar: str | None = None) -> msgspec.Meta:
 
 @dataclass(frozen=True)
 class Option:
-    """One field: `hint` is what a value is checked against, `type` that of one which is not None."""
+    """One field: `hint` is what a value is checked against, `type` that of one which is neither None nor a word.
+
+    `words`: what may be said in place of a number.
+    """
 
     name: str
     hint: Any
     type: Any
     meta: msgspec.Meta
     default: Any
+    words: tuple[str, ...] = ()
 
     @property
     def known(self) -> Collection[str]:
@@ -72,24 +76,34 @@ class Option:
         """The value as the record holds it. Raises Sdf2vecError for an impossible one."""
         if self.type is str and self.known:
             check_choice(str(self.meta.title), value, self.known)
-        if self.type not in NUMBERS:
+        if self.type not in NUMBERS or value in self.words:
             return value
         try:
             return msgspec.convert(_plain(value), self.hint)
         except msgspec.ValidationError:
             least, most = self.meta.ge, self.meta.le
             bounds = f"of at least {least}" if most is None else f"between {least} and {most}"
-            words = f"the {self.meta.title} must be {NUMBERS[self.type]} {bounds}"
+            words = f"the {self.meta.title} must be {' or '.join([*self.words, NUMBERS[self.type]])} {bounds}"
             raise Sdf2vecError(f"{words}, got {value!r}") from None
 
     def add_flag(self, parser: argparse._ActionsContainer) -> None:
         """Adds the flag of this name; what the user leaves out stays out of the namespace."""
         form: dict[str, Any] = {"action": "store_true"}
         if self.type is not bool:
-            form = {"type": self.type if self.type in NUMBERS else str}
+            form = {"type": self._read if self.type in NUMBERS else str}
             form["metavar"] = self._extra.get("metavar")
         flag = f"--{self.name.replace('_', '-')}"
         parser.add_argument(flag, default=argparse.SUPPRESS, help=self.help.replace("%", "%%"), **form)
+
+    def _read(self, text: str) -> Any:
+        """A number, or a word in its place. Raises ArgumentTypeError for anything else."""
+        if text in self.words:
+            return text
+        try:
+            return self.type(text)
+        except ValueError:
+            wanted = " or ".join([*self.words, NUMBERS[self.type]])
+            raise argparse.ArgumentTypeError(f"{text!r} is not {wanted}") from None
 
 
 @cache
@@ -97,7 +111,13 @@ def options_of(record: type[msgspec.Struct]) -> dict[str, Option]:
     """The fields of a record by name."""
     hints = get_type_hints(record, include_extras=True)
     return {
-        field.name: Option(field.name, hints[field.name], *_declared(hints[field.name]), field.default)
+        field.name: Option(
+            field.name,
+            hints[field.name],
+            *_declared(hints[field.name]),
+            field.default,
+            _words_of(hints[field.name]),
+        )
         for field in msgspec.structs.fields(record)
     }
 
@@ -107,7 +127,12 @@ def _declared(hint: Any) -> tuple[Any, msgspec.Meta]:
     parts = get_args(hint)
     if isinstance(parts[-1], msgspec.Meta):
         return parts[0], parts[-1]
-    return _declared(next(part for part in parts if part is not NoneType))
+    return _declared(next(part for part in parts if part is not NoneType and get_origin(part) is not Literal))
+
+
+def _words_of(hint: Any) -> tuple[str, ...]:
+    """The words of a `Literal` among the types of a union."""
+    return tuple(word for part in get_args(hint) if get_origin(part) is Literal for word in get_args(part))
 
 
 def _plain(value: Any) -> Any:

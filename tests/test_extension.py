@@ -17,9 +17,9 @@ from sdf2vec.engines.pages import ELEMENT
 from sdf2vec.export import EXPORTERS, Exporter, packing
 from sdf2vec.export.options import SVG_PROFILES, Options
 from sdf2vec.expr import Expr, absolute, cos, dot, length, maximum, minimum, mix, select, sin, vec2, vec4
+from sdf2vec.fit.adam import adam_over
 from sdf2vec.fit.constraints import project
 from sdf2vec.fit.initialization import Layers, place
-from sdf2vec.fit.loop import adam
 from sdf2vec.fit.presets import Start
 from sdf2vec.function import function
 from sdf2vec.layer import Part
@@ -196,7 +196,7 @@ def test_a_fit_starts_with_it_and_comes_nearer():
     layers = Layers(("waved",), "over", 1, "rings")
     tensors = place(target, (1.5, 1.0), layers, 5, Start(), torch.Generator().manual_seed(0))
     assert tensors.groups[0].structure == ((Part("waved", "rings")),)
-    optimizer, losses = adam(tensors), []
+    optimizer, losses = adam_over(tensors), []
     for _ in range(15):
         optimizer.zero_grad()
         loss = (reference.composite(tensors, 30, 20)[:3] - target).abs().mean()

@@ -22,8 +22,8 @@ from numba import njit
 from ..blend import OVER
 from ..expr import Expr
 from ..files import write_atomically
+from ..fit.adam import adam_over
 from ..fit.initialization import Layers, place
-from ..fit.loop import adam
 from ..fit.losses import l1
 from ..fit.presets import Start
 from ..fit.settings import MIXED, kinds_of
@@ -65,7 +65,7 @@ def seconds(run: Callable[[], object], least: float = 1.0) -> float:
 
 def step(tensors: SceneTensors, target: torch.Tensor, dense: bool) -> Callable[[], object]:
     """One step of a fit: forward, loss (L1 and SSIM), backward, update."""
-    optimizer = adam(tensors)
+    optimizer = adam_over(tensors)
     height, width = target.shape[1:]
     fast, absolute = Dissimilarity(target), l1(target)
 

@@ -5,13 +5,17 @@ The functional form is used: the class imports torch's compiler at its first ste
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable
 from dataclasses import dataclass
 
 import torch
 from torch.optim.adam import adam as adam_step
 
-from ..units import Unit
+from ..blend import COMPOSITING
+from ..render.tensors import SceneTensors
+from ..units import BACKGROUND, OPACITY, Unit
+from .presets import CROWDING, MANY
 
 BETAS = (0.9, 0.9)
 EPSILON = 1e-12
@@ -97,3 +101,16 @@ def _kept(memory: torch.Tensor, after: torch.Tensor, rows: torch.Tensor) -> torc
 def rate_of(unit: Unit, canvas: float, crowd: float) -> float:
     """Adam's rate for a canvas of this size, the square root of its area; `crowd` is the factor for many layers."""
     return unit.rate * (crowd if unit.crowded else 1.0) * canvas**unit.scaling
+
+
+def adam_over(tensors: SceneTensors, crowding: float = CROWDING, frozen: tuple[str, ...] = ()) -> Adam:
+    """Adam over all that may move, each tensor at the rate of its unit; `frozen`: names of units that may not."""
+    free = [(slot.parameter.unit, v) for group in tensors.groups for slot, v in group.values.items()]
+    if not tensors.transparent:
+        free.append((BACKGROUND, tensors.background))
+        if not COMPOSITING[tensors.compositing].hides:  # what is added to alpha is never seen
+            frozen = (*frozen, OPACITY.name)
+    few = MANY / max(1, tensors.layer_count)
+    crowd = few ** (crowding if few < 1 else CROWDING)
+    canvas = math.sqrt(tensors.size[0] * tensors.size[1])
+    return Adam((tensor, rate_of(unit, canvas, crowd)) for unit, tensor in free if unit.name not in frozen)

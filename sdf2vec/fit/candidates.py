@@ -18,7 +18,7 @@ import torch
 from ..blend import JOINS, SHARPEST
 from ..deferred import deferred
 from ..expr import const, var, vec3, vec4
-from ..layer import JOIN, Part, Slot, Structure, slots
+from ..layer import JOIN, LOOK, Part, Slot, Structure, slots
 from ..lower.torch import Tensors, compile_torch
 from ..paints import BASE, FLAT
 from ..render.reference import rows_coverage
@@ -137,12 +137,11 @@ def _closed_up(slot: Slot, index: int) -> Slot:
     return Slot(slot.part - 1, slot.parameter)
 
 
-def alone(layer: Group, color: torch.Tensor, falloff: float, around: Surroundings) -> list[Opening]:
+def alone(order: torch.Tensor, color: torch.Tensor, falloff: float, around: Surroundings) -> list[Opening]:
     """Where a layer begins anew in a colour [1, 3]: so that no more is covered than wanted, or all that is."""
-    looks = {slot: tensor for slot, tensor in layer.values.items() if slot.part is None}
-    looks |= {slot: torch.ones(1, 1) for slot in looks if slot.parameter.unit is OPACITY}
-    looks |= {slot: torch.full((1, 1), falloff) for slot in looks if slot.parameter.unit is FALLOFF}
-    near = _opening(Group((), layer.order, looks), 0, "", color, around)
+    opacity, edge = (Slot(None, parameter) for parameter in LOOK)
+    looks = {opacity: torch.ones(1, 1), edge: torch.full((1, 1), falloff)}
+    near = _opening(Group((), order, looks), 0, "", color, around)
     return [near, Opening(near.layer, 0, "", color, near.mask.eager())]
 
 
@@ -212,7 +211,7 @@ class Proposer:
 
     def candidates(self, places: Sequence[Opening], around: Surroundings) -> list[list[Tried]]:
         """For each opening a layer with the best shape of every kind in it; errors are estimates."""
-        starts = [self._placed(place.mask, around) for place in places]
+        starts = [self._placed(place.mask.gain, around) for place in places]
         used = [index for index, placed in enumerate(starts) if len(placed.sizes)]
         found: list[list[Tried]] = [[] for _ in places]
         for kind in self.kinds if used else ():
@@ -223,31 +222,68 @@ class Proposer:
                 found[index].append(Tried(layer, error + place.mask.rest))
         return found
 
+    def optima(
+        self,
+        kind: str,
+        places: Sequence[Opening],
+        wanted: Sequence[torch.Tensor],
+        around: Surroundings,
+        kept: int,
+    ) -> list[tuple[int, Group]]:
+        """All that shapes of a kind come to, with the opening that each is for, which has so many.
+
+        They start where most is `wanted` [P] of each opening.
+        """
+        starts = [self._placed(gain, around) for gain in wanted]
+        used = [index for index, start in enumerate(starts) if len(start.sizes)]
+        if not used:
+            return []
+        masks, placed = [places[i].mask for i in used], [starts[i] for i in used]
+        rows, _, counts = self._descended(kind, masks, placed, around, kept)
+        spread = [index for index, count in zip(used, counts, strict=True) for _ in range(count)]
+        part = places[0].part(kind, self.paint)
+        return [
+            (index, places[index].filled(part, _shape(kind, row)))
+            for index, row in zip(spread, rows, strict=True)
+        ]
+
     def _fitted(
         self, kind: str, masks: Sequence[Mask], starts: Sequence[Placed], around: Surroundings
     ) -> list[tuple[torch.Tensor, float]]:
         """For each mask the row [U] of the layer of one shape that comes nearest to it, and its squared error."""
+        rows, errors, counts = self._descended(kind, masks, starts, around, KEPT)
+        return [
+            (own[errors.argmin()], float(errors.min()))
+            for own, errors in zip(rows.split(counts), errors.split(counts), strict=True)
+        ]
+
+    def _descended(
+        self,
+        kind: str,
+        masks: Sequence[Mask],
+        starts: Sequence[Placed],
+        around: Surroundings,
+        kept: int,
+    ) -> tuple[torch.Tensor, torch.Tensor, list[int]]:
+        """Rows [N, U] of layers of one shape, their squared errors [N], and how many belong to each mask."""
         structure = (Part(kind),)
         best = []
         for mask, placed in zip(masks, starts, strict=True):
             fresh = _rows(structure, placed)
             errors = _misses(structure, [mask] * len(fresh), around, BLURS[0]).errors(fresh)
-            best.append(fresh[errors.argsort(stable=True)[:KEPT]])
+            best.append(fresh[errors.argsort(stable=True)[:kept]])
         counts = [len(rows) for rows in best]
         spread = [mask for mask, count in zip(masks, counts, strict=True) for _ in range(count)]
         numbers = self.numbers(structure, _is_geometry)
         rows = torch.cat(best)
         for blur in BLURS:
             rows, errors = descend(rows, _misses(structure, spread, around, blur), numbers, STEPS, self.tick)
-        return [
-            (own[errors.argmin()], float(errors.min()))
-            for own, errors in zip(rows.split(counts), errors.split(counts), strict=True)
-        ]
+        return rows, errors, counts
 
-    def _placed(self, mask: Mask, around: Surroundings) -> Placed:
+    def _placed(self, gain: torch.Tensor, around: Surroundings) -> Placed:
         """The regions of what is wanted: along each, the other way round, and turned at random without stretching."""
         height, width = around.shape
-        found = torch.tensor(ellipses_of(mask.gain.reshape(height, width).numpy())).reshape(-1, 5)
+        found = torch.tensor(ellipses_of(gain.reshape(height, width).numpy())).reshape(-1, 5)
         size = torch.tensor(around.scene.size)
         centers = (found[:, :2] / torch.tensor([width, height]) - 0.5) * size
         sizes = (found[:, 2] * found[:, 3]).sqrt() * (around.scene.size[0] / width)

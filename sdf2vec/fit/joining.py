@@ -55,7 +55,7 @@ def join(scene: SceneTensors, views: Sequence[View], search: Search, most: int) 
     Tried at the resolution of the first picture, refined at those of the others; never worse at the last.
     """
     coarse, *finer = views
-    scene, left = _grounded(_detached(scene), finer[-1]), list(range(scene.layer_count))
+    scene, left = _grounded(detached(scene), finer[-1]), list(range(scene.layer_count))
     while left and most > 0:
         order = max(left, key=_faults(scene, coarse).__getitem__)
         left.remove(order)
@@ -66,13 +66,13 @@ def join(scene: SceneTensors, views: Sequence[View], search: Search, most: int) 
             refined = [search.refined(tried.layer, around) for tried in found]
             found = [best] = [min(refined, key=search.worth(around, PRICE).of)]
         if best.error < around.error(layer):
-            changed = _replaced(scene, replace(best.layer, order=torch.tensor([order])))
+            changed = inserted(scene, replace(best.layer, order=torch.tensor([order])))
             scene = _grounded(changed, finer[-1])
         most -= tries
-        yield _detached(scene)
+        yield detached(scene)
 
 
-def _detached(scene: SceneTensors) -> SceneTensors:
+def detached(scene: SceneTensors) -> SceneTensors:
     """A copy with tensors of its own, that no derivative reaches."""
     groups = [group.each(lambda tensor: tensor.detach().clone()) for group in scene.groups]
     return replace(scene, groups=groups, background=scene.background.detach().clone())
@@ -106,8 +106,8 @@ def _grounded(scene: SceneTensors, view: View) -> SceneTensors:
     return min(scene, grounded, key=lambda tried: float(_wrong(tried, view).sum()))
 
 
-def _replaced(scene: SceneTensors, layer: Group) -> SceneTensors:
-    """The scene with another layer in the place of that with the same draw order."""
+def inserted(scene: SceneTensors, layer: Group) -> SceneTensors:
+    """The scene with a layer at its draw order, in the place of any that is there."""
     groups = list(some(scene, lambda place: place != layer.order).groups)
     for index, group in enumerate(groups):
         if group.structure == layer.structure:
@@ -199,27 +199,26 @@ class Search:
 
     def refined(self, layer: Group, around: Surroundings) -> Tried:
         """A layer after some more steps down the squared error."""
-        return self._trained(layer, around, REFINING, lambda slot: True)
+        return self.trained(layer, around, REFINING, lambda slot: True)
 
-    def _trained(
-        self, layer: Group, around: Surroundings, steps: int, moves: Callable[[Slot], bool]
-    ) -> Tried:
+    def trained(self, layer: Group, around: Surroundings, steps: int, moves: Callable[[Slot], bool]) -> Tried:
+        """A layer after so many steps of some of its numbers down the squared error."""
         structure = layer.structure
-        numbers = self._numbers(around, structure, moves)
+        numbers = self.numbers(around, structure, moves)
         rows, errors = descend(layer.rows(), around.problem(structure), numbers, steps, self.tick)
-        return Tried(_of_rows(structure, layer.order, rows), float(errors[0]))
+        return Tried(layer_of(structure, layer.order, rows), float(errors[0]))
 
     def _searched(self, layer: Group, around: Surroundings, worth: Worth, steps: int) -> Tried:
         """A layer after so many steps; what is sharp stays so, as softness makes up for shapes that are missing."""
         still = (FALLOFF, SMOOTHNESS) if worth.is_sharp(layer) else ()
-        return self._trained(layer, around, steps, lambda slot: slot.parameter.unit not in still)
+        return self.trained(layer, around, steps, lambda slot: slot.parameter.unit not in still)
 
     def _started(self, layer: Group, around: Surroundings, worth: Worth) -> list[Tried]:
         """The layer, and some of one shape that are begun anew: the nearest, and one from which to cut."""
         is_patch = KINDS[layer.structure[0].kind].patch is not None
         old = [] if is_patch else [self._searched(layer, around, worth, TRAINING)]
-        places = alone(layer, self._color(around), self.falloff[0], around)
-        near, wide = (worth.best(found) for found in self._proposer(around).candidates(places, around))
+        places = alone(layer.order, self._color(around), self.falloff[0], around)
+        near, wide = (worth.best(found) for found in self.proposer(around).candidates(places, around))
         anew = [self._searched(tried.layer, around, worth, TRAINING) for tried in near]
         whole = [Tried(tried.layer, around.error(tried.layer)) for tried in wide[:1]]
         return sorted([*old, *worth.distinct(anew, around, BEAM), *whole], key=worth.of)
@@ -239,14 +238,15 @@ class Search:
     def _proposed(self, tried: Tried, around: Surroundings, worth: Worth) -> list[Tried]:
         """The most promising changes of a layer, and the part that matters least left out."""
         places = list(openings(tried.layer, around))
-        found = self._proposer(around).candidates(places, around)
+        found = self.proposer(around).candidates(places, around)
         kinds = (kind for own in found for kind in worth.best(own)[:KINDS_EACH])
         fewer = (Tried(less, around.error(less)) for less in reductions(tried.layer))
         return [*worth.best(kinds)[:FINALISTS], *worth.best(fewer)[:1]]
 
-    def _proposer(self, around: Surroundings) -> Proposer:
+    def proposer(self, around: Surroundings) -> Proposer:
+        """What fits single shapes to masks."""
         kinds = tuple(kind for kind in self.layers.kinds if KINDS[kind].patch is None)
-        return Proposer(kinds, self.layers.paint, self.generator, partial(self._numbers, around), self.tick)
+        return Proposer(kinds, self.layers.paint, self.generator, partial(self.numbers, around), self.tick)
 
     def _color(self, around: Surroundings) -> torch.Tensor:
         """The mean colour [1, 3] of what a layer should show."""
@@ -255,7 +255,7 @@ class Search:
         wanted = residual if self.layers.signed else around.target
         return straight((wanted * amount).sum(dim=(1, 2))[None] / amount.sum().clamp_min(1e-6))[:, :3]
 
-    def _numbers(self, around: Surroundings, structure: Structure, moves: Callable[[Slot], bool]) -> Numbers:
+    def numbers(self, around: Surroundings, structure: Structure, moves: Callable[[Slot], bool]) -> Numbers:
         """Which numbers of a structure's rows move, how far in one step, and what keeps them in their range."""
         scene = around.scene
         side = math.sqrt(scene.size[0] * scene.size[1])
@@ -268,13 +268,13 @@ class Search:
         ]
 
         def keep(rows: torch.Tensor) -> None:
-            group = _of_rows(structure, torch.zeros(1, dtype=torch.int64), rows)
+            group = layer_of(structure, torch.zeros(1, dtype=torch.int64), rows)
             project(replace(scene, groups=[group]), self.pixel, self.falloff)
 
         return Numbers(torch.tensor(free).nonzero()[:, 0], torch.tensor(rates), keep)
 
 
-def _of_rows(structure: Structure, order: torch.Tensor, rows: torch.Tensor) -> Group:
+def layer_of(structure: Structure, order: torch.Tensor, rows: torch.Tensor) -> Group:
     """Layers of a structure from their rows [G, U]."""
     parts = rows.split([slot.parameter.width for slot in slots(structure)], dim=1)
     return Group(structure, order[:1].expand(len(rows)), dict(zip(slots(structure), parts, strict=True)))

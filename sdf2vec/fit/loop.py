@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import dataclass, replace
 from functools import partial
@@ -11,7 +11,6 @@ from functools import partial
 import numpy as np
 import torch
 
-from ..blend import COMPOSITING
 from ..deferred import deferred
 from ..errors import Sdf2vecError
 from ..image import Picture, premultiply, resize, unpremultiply
@@ -19,8 +18,7 @@ from ..render import fused
 from ..render.tensors import Group, SceneTensors, from_scene, on_device, to_scene
 from ..scene import Scene
 from ..threads import threads_of_its_own
-from ..units import BACKGROUND, OPACITY
-from .adam import Adam, rate_of
+from .adam import Adam, adam_over
 from .backends import Backend, choose
 from .constraints import enforce_min_thickness, project, too_small
 from .growth import densify, exchange, importance, prune, relocate
@@ -28,7 +26,7 @@ from .initialization import Layers, background_of, empty_groups, place
 from .joining import RESOLUTIONS as JOIN_RESOLUTIONS
 from .joining import Search, join
 from .losses import Objective, objective
-from .presets import CROWDING, MANY, Phase, Start
+from .presets import CROWDING, Phase, Start
 from .settings import Settings, preset_of
 from .surroundings import View
 from .weights import weights_for
@@ -101,7 +99,7 @@ class Fit:
         self.pixels = picture.premultiplied
         self.pixel = 1.0 / min(picture.width, picture.height)
         self.size = (picture.width * self.pixel, picture.height * self.pixel)
-        self.wanted = settings.shapes // settings.union  # layers
+        self.wanted = settings.most // settings.union  # layers
         self.done, self.steps, self.stopped = 0, self._count_steps(), False
         self.tensors = self._start()
         self._announce_compiling()
@@ -143,7 +141,7 @@ class Fit:
 
     def _adam(self, frozen: tuple[str, ...] = ()) -> Adam:
         losses = {name for phase in self.phases for name, _ in phase.loss}
-        return adam(self.tensors, self.preset.crowding if "ssim" in losses else CROWDING, frozen)
+        return adam_over(self.tensors, self.preset.crowding if "ssim" in losses else CROWDING, frozen)
 
     def _count_steps(self) -> int:
         steps = sum(phase.total for phase in self.phases)
@@ -168,15 +166,15 @@ class Fit:
 
     def _resize(self, tensors: SceneTensors, target: torch.Tensor) -> None:
         """Brings a start scene to the number of shapes asked for, or just below it where unions leave a rest."""
-        optimizer = adam(tensors)
-        spare = tensors.shape_count - self.settings.shapes
+        optimizer = adam_over(tensors)
+        spare = tensors.shape_count - self.settings.most
         if spare > 0:
             image = fused.composite(tensors, target.shape[2], target.shape[1], len(target))
             scores = importance(image, tensors, self.generator)
             sizes = torch.cat([torch.full((len(group),), len(group.structure)) for group in tensors.groups])
             taken = sizes[torch.cat(scores).argsort(stable=True)].cumsum(0)
             exchange(tensors, optimizer, prune(scores, int((taken < spare).sum()) + 1), ())
-        count = (self.settings.shapes - tensors.shape_count) // self.settings.union
+        count = (self.settings.most - tensors.shape_count) // self.settings.union
         if count > 0:
             image = fused.composite(tensors, target.shape[2], target.shape[1], len(target))
             self._add(tensors, optimizer, image, target, count)
@@ -222,7 +220,7 @@ class Fit:
         return Stage(phase, target, weights, objective(phase.loss, target, weights, self.backend.losses))
 
     def _resolution(self, phase: Phase) -> float:
-        return self.preset.resolution(phase, self.settings.shapes)
+        return self.preset.resolution(phase, self.settings.most)
 
     def _draw(self, tensors: SceneTensors, target: torch.Tensor) -> torch.Tensor:
         channels, height, width = target.shape
@@ -231,7 +229,7 @@ class Fit:
     def _train(self, stage: Stage, moves: Callable[[Group], torch.Tensor] | None = None) -> None:
         """The steps of a phase; `moves` tells which layers of a group are trained, all without it."""
         phase = stage.phase
-        for step, rate in enumerate(_rates(phase)):
+        for step, rate in enumerate(phase.rates()):
             if phase.growth is not None and self.settings.start is None:
                 self._grow(stage, phase.growth.count(step, phase.steps, self.wanted))
             if phase.relocation is not None and phase.relocation.is_due(step, phase.steps):
@@ -349,7 +347,7 @@ def _join_groups(tensors: SceneTensors, optimizer: Adam, fresh: list[Group]) -> 
 
 
 def _layers_of(settings: Settings) -> Layers:
-    return Layers(settings.kind, settings.compositing, settings.union, settings.paint)
+    return Layers(settings.kinds, settings.compositing, settings.union, settings.paint)
 
 
 def _check_start(scene: Scene, size: tuple[float, float]) -> None:
@@ -374,26 +372,6 @@ def _freeze(tensors: SceneTensors, moves: Callable[[Group], torch.Tensor]) -> No
                 tensor.grad[still] = 0.0
     if tensors.background.grad is not None:
         tensors.background.grad.zero_()
-
-
-def adam(tensors: SceneTensors, crowding: float = CROWDING, frozen: tuple[str, ...] = ()) -> Adam:
-    """Adam over all that may move, each tensor at the rate of its unit; `frozen`: names of units that may not."""
-    free = [(slot.parameter.unit, v) for group in tensors.groups for slot, v in group.values.items()]
-    if not tensors.transparent:
-        free.append((BACKGROUND, tensors.background))
-        if not COMPOSITING[tensors.compositing].hides:  # what is added to alpha is never seen
-            frozen = (*frozen, OPACITY.name)
-    few = MANY / max(1, tensors.layer_count)
-    crowd = few ** (crowding if few < 1 else CROWDING)
-    canvas = math.sqrt(tensors.size[0] * tensors.size[1])
-    return Adam((tensor, rate_of(unit, canvas, crowd)) for unit, tensor in free if unit.name not in frozen)
-
-
-def _rates(phase: Phase) -> Iterator[float]:
-    """The factor on all rates at each step of a phase."""
-    for step in range(phase.steps):
-        fall = 0.5 - 0.5 * math.cos(math.pi * step / max(1, phase.steps - 1))
-        yield phase.rate + (phase.end_rate - phase.rate) * fall
 
 
 def scaled(pixels: np.ndarray, resolution: float) -> torch.Tensor:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Literal
 
@@ -72,6 +73,12 @@ class Phase:
     def total(self) -> int:
         """Steps of all batches."""
         return self.steps * self.batches
+
+    def rates(self) -> Iterator[float]:
+        """The factor on all rates at each step."""
+        for step in range(self.steps):
+            fall = 0.5 - 0.5 * math.cos(math.pi * step / max(1, self.steps - 1))
+            yield self.rate + (self.end_rate - self.rate) * fall
 
 
 @dataclass(frozen=True)

@@ -7,7 +7,7 @@ import os
 import re
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import replace
-from typing import Annotated, Any
+from typing import Annotated, Any, Literal
 
 from msgspec import Struct, structs
 
@@ -28,8 +28,34 @@ MOST_COLORS = 256
 LARGEST_AREA = 0.1  # share of the canvas
 
 
-Shapes = Annotated[
-    int, number("number of shapes", "N", 1, MAX_SHAPES, "how many shapes, or as many as the start has")
+AUTO: Literal["auto"] = "auto"
+DRAWN = ("circle", "ellipse", "box", "triangle")  # what drawings are made of, unless kinds are given
+PAINTED = ("triangle",)  # what else is, unless kinds are given
+
+Shapes = (
+    Annotated[
+        int,
+        number(
+            "number of shapes",
+            "N|auto",
+            1,
+            MAX_SHAPES,
+            "how many shapes; auto: no more than the picture needs, or as many as the start has",
+        ),
+    ]
+    | Literal["auto"]
+)
+MaxShapes = Annotated[
+    int, number("largest number of shapes", "N", 1, MAX_SHAPES, "with --shapes auto, at most so many")
+]
+TargetPsnr = Annotated[
+    float,
+    number(
+        "wanted PSNR (dB)", "DB", 1, 100, "with --shapes auto, as few shapes as come so near to the picture"
+    ),
+]
+TargetFlip = Annotated[
+    float, number("wanted FLIP", "FLIP", 0, 1, "the same, by FLIP: 0 for what looks the same")
 ]
 Seed = Annotated[int, number("seed", "S", 0, 2**63 - 1, "the same seed gives the same scene")]
 Union = Annotated[
@@ -67,10 +93,15 @@ Colors = Annotated[int, number("number of colours", "K", 1, MOST_COLORS, "how ma
 class Settings(Struct, frozen=True):
     """What to fit and how: the options of a fit, read. `weights`: how much an error matters, 0..1, [H, W]."""
 
-    shapes: Shapes = 256
+    shapes: Shapes = AUTO
     kind: Annotated[
-        tuple[str, ...], choice("kind", "which shapes, one kind or several: box,circle", (*KINDS, MIXED))
-    ] = ("triangle",)
+        tuple[str, ...],
+        choice(
+            "kind",
+            "which shapes, one kind or several: box,circle; unless told triangle, and whatever a drawing is made of",
+            (*KINDS, MIXED),
+        ),
+    ] = ()
     compositing: Annotated[str, choice("compositing", "how shapes lie on each other", COMPOSITING)] = "over"
     preset: Annotated[str, choice("preset", "how long to fit, and in which steps", PRESETS)] = DEFAULT
     loss: Annotated[
@@ -90,6 +121,24 @@ class Settings(Struct, frozen=True):
     ] = ()
     colors: Colors | None = None
     weights: Annotated[Any, plain("a picture that is bright where errors matter", "MASK")] = None
+    max_shapes: MaxShapes = 256
+    target_psnr: TargetPsnr | None = None
+    target_flip: TargetFlip | None = None
+
+    @property
+    def most(self) -> int:
+        """How many shapes there are at most; exactly so many unless that is to be found out."""
+        return self.max_shapes if self.shapes == AUTO else self.shapes
+
+    @property
+    def kinds(self) -> tuple[str, ...]:
+        """What a picture that is no drawing is painted with."""
+        return self.kind or PAINTED
+
+    @property
+    def drawn_kinds(self) -> tuple[str, ...]:
+        """What a drawing may be made of: shapes with an edge."""
+        return tuple(name for name in self.kind or DRAWN if KINDS[name].patch is None)
 
 
 def preset_of(settings: Settings) -> Preset:
@@ -107,7 +156,9 @@ def preset_of(settings: Settings) -> Preset:
     return preset
 
 
-def settings_of(shapes: int | None = None, *, compositing: str | None = None, **options: Any) -> Settings:
+def settings_of(
+    shapes: int | Literal["auto"] | None = None, *, compositing: str | None = None, **options: Any
+) -> Settings:
     """The settings of a fit in the words of the user (see `api.fit`). Raises Sdf2vecError for the first bad one."""
     given = {name: READERS[name](value) if name in READERS else value for name, value in options.items()}
     start: Scene | None = given.get("start")
@@ -124,12 +175,14 @@ def settings_of(shapes: int | None = None, *, compositing: str | None = None, **
 
 def _check_together(settings: Settings) -> None:
     """Raises Sdf2vecError for settings that don't go with each other."""
-    shapes, union = settings.shapes, settings.union
+    shapes, union = settings.most, settings.union
+    if settings.shapes != AUTO and (settings.target_psnr, settings.target_flip) != (None, None):
+        raise Sdf2vecError("either a number of shapes or a target, not both: --shapes auto finds the number")
     if shapes % union:
         raise Sdf2vecError(f"{shapes} shapes can't be joined by {union}: choose a multiple of {union}")
-    if settings.cuts and all(KINDS[name].patch is not None for name in settings.kind):
+    if settings.cuts and all(KINDS[name].patch is not None for name in settings.kinds):
         raise Sdf2vecError(
-            f"cuts need a kind of shape that can be joined with others, got {', '.join(settings.kind)}"
+            f"cuts need a kind of shape that can be joined with others, got {', '.join(settings.kinds)}"
         )
     preset_of(settings)
     if settings.palette and settings.colors:

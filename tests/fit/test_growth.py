@@ -7,10 +7,10 @@ import torch
 
 from sdf2vec import Layer, Scene, Shape
 from sdf2vec.fit import growth
-from sdf2vec.fit.adam import Adam
+from sdf2vec.fit.adam import Adam, adam_over
 from sdf2vec.fit.growth import densify, exchange, importance, prune
 from sdf2vec.fit.initialization import Layers, Places, empty_groups, groups_at
-from sdf2vec.fit.loop import Fit, adam
+from sdf2vec.fit.loop import Fit
 from sdf2vec.fit.matching_pursuit import WIDTH, Missing, Painted, find_discs
 from sdf2vec.fit.presets import PRESETS, Growth, Phase, Preset, Relocation
 from sdf2vec.fit.settings import settings_of
@@ -59,7 +59,7 @@ def test_importance_is_what_the_image_loses(monkeypatch, compositing, transparen
     ]
     expected = torch.tensor([float(change.square().sum()) for change in changes])
     tensors = from_scene(scene)
-    adam(tensors)
+    adam_over(tensors)
     image = composite(tensors, 18, 12)[:channels]
     scores = importance(image, tensors, seeded(), weights)
     estimate = torch.empty(7)
@@ -74,7 +74,7 @@ def test_importance_of_a_layer_that_shows_nowhere_is_nothing():
     cover = Shape.of("circle", (0, 1, 0), center=(0, 0), radius=0.45)
     tensors = from_scene(Scene(16, 16, (Layer((hidden,), 0.0), Layer((cover,), 0.0)), (0, 0, 0)))
     tensors.groups += empty_groups(Layers(("box",), "over"))
-    adam(tensors)
+    adam_over(tensors)
     scores = importance(composite(tensors, 16, 16), tensors, seeded())
     assert float(scores[0][0]) < 1e-6 < float(scores[0][1])
     assert scores[1].shape == (0,)
@@ -105,7 +105,7 @@ def circles(count: int, seed: int = 0) -> list[Group]:
 def two_kinds():
     scene = random_scene(("circle", "box"), layers=8, joins=())
     tensors = from_scene(scene)
-    return tensors, adam(tensors)
+    return tensors, adam_over(tensors)
 
 
 def step(tensors, optimizer, times=1):
@@ -173,7 +173,7 @@ def test_the_draw_order_has_no_gaps_and_new_layers_lie_on_top():
 def test_a_group_may_lose_all_rows_and_a_new_kind_may_come():
     scene = random_scene(("box",), layers=3, joins=(), paints=("flat",))
     tensors = from_scene(scene)
-    optimizer = adam(tensors)
+    optimizer = adam_over(tensors)
     exchange(tensors, optimizer, [torch.arange(0)], circles(2))
     assert [(group.structure, len(group)) for group in tensors.groups] == [
         ((Part("box"),), 0),
@@ -411,13 +411,13 @@ def test_a_fit_that_grows_ends_with_all_shapes(monkeypatch, shapes, union):
 
 def test_what_is_known_of_old_layers_stays_and_rates_are_of_the_new_number():
     scene = Scene(24, 24, tuple(Layer((Shape("circle", (0, 0, 0.2), (1, 0, 0)),), 0.1) for _ in range(3)))
-    few = adam(from_scene(scene))
+    few = adam_over(from_scene(scene))
     for moving in few.moving:
         moving.mean += 2.0
     tensors = from_scene(scene)
     for group in tensors.groups:
         group.values = {slot: few.moving[i].tensor for i, slot in enumerate(group.values)}
-    many = adam(tensors).remembers(few)
+    many = adam_over(tensors).remembers(few)
     assert [float(moving.mean.mean()) for moving in many.moving[:-1]] == [2.0] * (len(many.moving) - 1)
     assert float(many.moving[-1].mean.mean()) == 0.0  # a background that is another tensor
 

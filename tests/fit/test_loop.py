@@ -10,6 +10,7 @@ import torch
 import sdf2vec
 from sdf2vec.blend import COMPOSITING
 from sdf2vec.fit import backends, constraints, loop, losses
+from sdf2vec.fit.adam import adam_over
 from sdf2vec.fit.initialization import Layers, detail, place
 from sdf2vec.fit.loop import Progress, fit_picture, scaled
 from sdf2vec.fit.presets import PRESETS, Start
@@ -172,7 +173,7 @@ def test_all_that_is_seen_moves(compositing, transparent, still):
     scene = random_scene(("circle",), compositing, 4, joins=(), paints=("flat",), transparent=transparent)
     tensors = from_scene(scene)
     everything = [tensor for group in tensors.groups for tensor in group.values.values()]
-    assert len(loop.adam(tensors).moving) == len([*everything, tensors.background]) - still
+    assert len(adam_over(tensors).moving) == len([*everything, tensors.background]) - still
 
 
 def test_a_device_that_is_not_there_is_refused_in_one_line():

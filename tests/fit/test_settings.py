@@ -8,7 +8,7 @@ import torch
 
 import sdf2vec
 from sdf2vec import Layer, Scene, Sdf2vecError, Shape
-from sdf2vec.fit import loop
+from sdf2vec.fit.adam import adam_over
 from sdf2vec.fit.loop import Fit, Progress
 from sdf2vec.fit.presets import MANY, Phase, Preset
 from sdf2vec.fit.settings import Settings, preset_of, settings_of
@@ -90,7 +90,7 @@ def test_a_batch_leaves_the_others_alone():
     ground = fit.tensors.background.detach().clone()
     fit._train(replace(stage, phase=replace(batches, steps=1)), lambda group: group.order < 0)
     before = state()
-    fit.optimizer = loop.adam(fit.tensors)
+    fit.optimizer = adam_over(fit.tensors)
     fit._train(stage, lambda group: group.order % 4 == 1)
     moved = {order for order, values in state().items() if not torch.equal(values, before[order])}
     assert moved == {1, 5}

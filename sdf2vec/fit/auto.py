@@ -1,0 +1,268 @@
+"""How many shapes: no more than a picture needs.
+
+A drawing is made of few shapes, which are found one by one (`sparse`); anything else is painted with as many as are
+allowed, or with as few as meet a target.
+"""
+
+from __future__ import annotations
+
+import math
+from collections import Counter
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import torch
+from msgspec import structs
+
+from ..image import Picture
+from ..quality import Quality, quality
+from ..render.tensors import SceneTensors, to_scene
+from ..scene import Scene
+from ..threads import threads_of_its_own
+from .initialization import Layers, straight
+from .joining import Search
+from .loop import Callback, Progress, Stopped, fit_picture, scaled
+from .matching_pursuit import Painted, find_discs
+from .offers import common_color
+from .settings import AUTO, Settings, preset_of
+from .simplify import simplified
+from .sparse import FLOOR, Round, Sizes, error_of, finished, grow, needed, pruned
+from .surroundings import View
+from .weights import weights_for
+
+SEARCH, JOINT, LAST = 56, 128, 320  # pixels squared
+FEW = 4  # shapes that are placed by trial, also where their number is given
+LEVELS = 3.5 / 255  # by which pixels of one flat colour differ at most
+FLAT = 0.6  # share of pixels next to the same colour, of a drawing in flat colours
+DISCS, LEFT = 16, 0.2  # so many discs leave so much of a soft drawing's variance, and more of a photograph's
+DISC_RESOLUTION = 48
+UNLIKELY = 1.5  # of the most shapes: a picture that needs more is no drawing
+SOFT_MOST = 48  # shapes of a soft drawing
+GOOD = 10**-3.5  # mean squared error, 35 dB, of what is surely found
+DOMINANT = 0.15  # share of the most common colour, of a picture that has a ground
+TRIES = 3  # fits for a target
+SLOPE = 1.7  # dB for twice the shapes, about
+
+
+@dataclass(frozen=True)
+class Fitted:
+    """A scene, what was decided about the number of its shapes, and whether a target was met."""
+
+    scene: Scene
+    reason: str = ""
+    met: bool = True
+
+
+def fitted_picture(
+    picture: Picture, settings: Settings, callback: Callback = lambda progress: False
+) -> Fitted:
+    """Fits shapes to a picture, as many as the settings say or as it needs. The same settings give the same scene.
+
+    The callback runs after every step; when it returns True, the fit ends and what is there is returned. Raises
+    Sdf2vecError where the start scene does not suit the picture or the settings.
+    """
+    with threads_of_its_own():
+        return _few(picture, settings, callback) or _painted(picture, settings, callback)
+
+
+def _few(picture: Picture, settings: Settings, callback: Callback) -> Fitted | None:
+    """The scene of a drawing, or of few shapes; None where it is to be painted."""
+    if not _may_be_few(settings):
+        return None
+    flat = is_flat(picture)
+    if settings.shapes == AUTO and not flat and not _is_soft(picture):
+        return None
+    drawing = Drawing(picture, settings, callback, flat)
+    found = drawing.found()
+    if drawing.stopped:
+        return _told(found, picture, settings)
+    if settings.shapes == AUTO:
+        if drawing.gave_up:
+            return None
+        if drawing.error <= (drawing.floor if settings.target_psnr else GOOD):
+            return Fitted(found, _counted(found))
+    painted = fit_picture(picture, _going_on(settings, found), callback)
+    as_wanted = settings.shapes in (AUTO, found.shape_count)
+    return _told(_nearest([painted, *([found] if as_wanted else [])], picture), picture, settings)
+
+
+def _nearest(scenes: Sequence[Scene], picture: Picture) -> Scene:
+    """The first of those with the highest PSNR."""
+    near = [quality(scene, picture).psnr for scene in scenes]
+    return scenes[near.index(max(near))]
+
+
+def _told(scene: Scene, picture: Picture, settings: Settings) -> Fitted:
+    """A scene with what there is to say of it."""
+    if settings.target_psnr is None:
+        return Fitted(scene, _counted(scene))
+    met = _missed(quality(scene, picture), settings) <= 0
+    return Fitted(scene, f"{_counted(scene)}: {_wanted(settings)} is {'' if met else 'not '}reached", met)
+
+
+def _may_be_few(settings: Settings) -> bool:
+    plain = settings.compositing == "over" and settings.union == 1 and settings.start is None
+    more = settings.palette or settings.colors or settings.cuts or settings.trials
+    few = settings.shapes == AUTO or settings.shapes <= FEW
+    return plain and few and not more and bool(settings.drawn_kinds) and settings.target_flip is None
+
+
+def _going_on(settings: Settings, found: Scene) -> Settings:
+    """The settings of a fit that goes on from what was found, where that is something."""
+    return structs.replace(settings, start=found if found.layers else None, shapes=settings.most)
+
+
+# --- drawings -------------------------------------------------------------------------------------------------
+
+
+def is_flat(picture: Picture) -> bool:
+    """Whether most pixels have the colour of their neighbours."""
+    pixels = picture.premultiplied
+    across = np.abs(np.diff(pixels, axis=1)).max(axis=2, initial=0.0) <= LEVELS
+    down = np.abs(np.diff(pixels, axis=0)).max(axis=2, initial=0.0) <= LEVELS
+    return min(share(across), share(down)) >= FLAT
+
+
+def share(chosen: np.ndarray) -> float:
+    """The share of what is true; of nothing, all."""
+    return float(chosen.mean()) if chosen.size else 1.0
+
+
+def _is_soft(picture: Picture) -> bool:
+    """Whether a few discs come near to the picture, as they do not to a photograph."""
+    target = scaled(picture.premultiplied, DISC_RESOLUTION)
+    image = target.flatten(1).median(1).values[:, None, None].expand_as(target).clone()
+    before = (image - target).square().mean()
+    find_discs(Painted(image, target, torch.ones(target.shape[1:])), DISCS)
+    return bool((image - target).square().mean() <= LEFT * before)
+
+
+class Drawing:
+    """The search for the few shapes that a picture is made of."""
+
+    def __init__(self, picture: Picture, settings: Settings, callback: Callback, flat: bool) -> None:
+        self.picture, self.settings, self.callback, self.flat = picture, settings, callback, flat
+        self.stopped, self.gave_up, self.error = False, False, math.inf
+        pixel = 1.0 / min(picture.width, picture.height)
+        self.size = (picture.width * pixel, picture.height * pixel)
+        target = settings.target_psnr
+        self.floor = FLOOR if target is None else 10 ** (-target / 10)
+        generator = torch.Generator().manual_seed(settings.seed)
+        layers = Layers(settings.drawn_kinds, settings.compositing)
+        self.search = Search(layers, preset_of(settings).falloff, generator, self._tick, pixel)
+        self.sizes = Sizes(*(self._view(resolution) for resolution in (SEARCH, JOINT, LAST)))
+        self.scene = SceneTensors([], ground_of(self.sizes.joint.target), settings.compositing, self.size)
+
+    def found(self) -> Scene:
+        """The scene, as simple as it may be."""
+        try:
+            for made in grow(self.scene, self.sizes, self.search, self.settings.most, self.floor):
+                self.scene, self.error = made.scene, made.error
+                if self._is_no_drawing(made):
+                    self.gave_up = True
+                    break
+            if not self.gave_up:
+                self._finish()
+        except Stopped:
+            self.stopped = True
+        self.error = error_of(self.scene, self.sizes.last)
+        return to_scene(self.scene, self.picture.width, self.picture.height)
+
+    def _finish(self) -> None:
+        self.scene = finished(self.scene, self.sizes, self.search)
+        worst = 0.0 if self.settings.target_psnr is None else self.floor
+        if worst:
+            self.scene = pruned(self.scene, self.sizes, self.search, worst)
+        self.scene = simplified(self.scene, self.sizes.joint, self.search, worst)
+
+    def _is_no_drawing(self, made: Round) -> bool:
+        """Whether far more shapes would be needed than there may be."""
+        if self.settings.shapes != AUTO:
+            return False
+        most = UNLIKELY * self.settings.most if self.flat else SOFT_MOST
+        return made.scene.layer_count + needed(made, self.flat, self.floor) > most
+
+    def _view(self, resolution: float) -> View:
+        target = scaled(self.picture.premultiplied, resolution)
+        if self.settings.weights is None:
+            return View(target, None)
+        height, width = target.shape[1:]
+        return View(target, torch.from_numpy(weights_for(self.settings.weights, width, height)))
+
+    def _tick(self, loss: float) -> None:
+        count = self.scene.layer_count
+        if self.callback(Progress("finding shapes", count, max(count + 1, self.settings.most), loss)):
+            raise Stopped
+
+
+def ground_of(target: torch.Tensor) -> torch.Tensor:
+    """The most common colour of a picture [C, H, W] where it dominates, else the mean; nothing where it has alpha."""
+    if len(target) == 4:
+        return torch.zeros(4)
+    colors = target.flatten(1).T
+    common = common_color(colors, torch.ones(len(colors)))
+    near = (colors - common).abs().amax(1) < LEVELS
+    ground = common if float(near.float().mean()) >= DOMINANT else colors.mean(0)
+    return torch.cat([straight(ground[None])[0, :3], torch.ones(1)])
+
+
+# --- targets --------------------------------------------------------------------------------------------------
+
+
+def _painted(picture: Picture, settings: Settings, callback: Callback) -> Fitted:
+    """The fit of a picture that is no drawing."""
+    scene = fit_picture(picture, settings, callback)
+    if settings.shapes != AUTO:
+        return Fitted(scene)
+    if settings.target_psnr is None and settings.target_flip is None:
+        return Fitted(
+            scene, f"{_counted(scene)}: as many as are allowed, for it is no drawing (--max-shapes)"
+        )
+    seen = quality(scene, picture)
+    if _missed(seen, settings) > 0:
+        return Fitted(scene, f"{_counted(scene)}: {_wanted(settings)} is not reached (--max-shapes)", False)
+    for fewer in _fewer(picture, settings, scene, callback):
+        scene = fewer
+    return Fitted(scene, f"{_counted(scene)} reach {_wanted(settings)}")
+
+
+def _fewer(picture: Picture, settings: Settings, scene: Scene, callback: Callback) -> Iterator[Scene]:
+    """Scenes of ever fewer shapes that meet the target."""
+    low, high, missed = 0, scene.shape_count, _missed(quality(scene, picture), settings)
+    for _ in range(TRIES):
+        count = round(high * 2 ** (missed / SLOPE))
+        count = min(max(count, low + 1), high - 1)
+        if count <= low or count >= high:
+            return
+        tried = fit_picture(picture, structs.replace(settings, shapes=count), callback)
+        missed = _missed(quality(tried, picture), settings)
+        if missed <= 0:
+            high = count
+            yield tried
+        else:
+            low, missed = count, -0.5 * SLOPE * math.log2(high / count)
+
+
+def _missed(seen: Quality, settings: Settings) -> float:
+    """By how many dB, or about so many, a target is missed; negative where it is more than met."""
+    missed = -math.inf
+    if settings.target_psnr is not None:
+        missed = settings.target_psnr - seen.psnr
+    if settings.target_flip is not None:
+        ratio = seen.flip / max(settings.target_flip, 1e-6)
+        missed = max(missed, 2 * SLOPE * math.log2(max(ratio, 1e-6)))
+    return missed
+
+
+def _wanted(settings: Settings) -> str:
+    psnr, flip = settings.target_psnr, settings.target_flip
+    words = [f"PSNR {psnr:g} dB"] if psnr is not None else []
+    return " and ".join([*words, *([f"FLIP {flip:g}"] if flip is not None else [])])
+
+
+def _counted(scene: Scene) -> str:
+    """How many shapes of which kinds."""
+    kinds = Counter(shape.kind for layer in scene.layers for shape in layer.shapes)
+    listed = ", ".join(f"{count} {kind}" for kind, count in kinds.most_common())
+    return f"{scene.shape_count} shapes" + (f" ({listed})" if listed else "")

@@ -1,0 +1,260 @@
+"""Single shapes that explain what a scene lacks: searched in each missing colour, on top of it and at its bottom.
+
+A shape on top must not cover more than its own region; one at the bottom may lie under all the others, so that a shape
+which is partly hidden can be found whole. What explains a region is taken before what gains more but leaves a rest.
+"""
+
+from __future__ import annotations
+
+import math
+from collections import defaultdict
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import torch
+from torch.nn.functional import max_pool2d
+
+from ..deferred import deferred
+from ..layer import row_width
+from ..render.reference import rows_coverage
+from ..render.tensors import Group
+from .candidates import Mask, Opening, alone
+from .initialization import straight
+from .joining import Search, layer_of
+from .levenberg import Problem, descend
+from .surroundings import Surroundings
+
+label: Callable[..., Any] = deferred("skimage.measure", "label")
+
+COLORS = 3  # that are missing most, looked for at once
+BINS = 8  # of a channel, when colours are counted
+NEAR = 0.02  # squared distance of colours that are one
+LEAST = 0.02  # share of all that is missing, of a colour that is looked for
+REGION = 0.2  # of the greatest gain: what belongs to a region
+STARTS = 6  # of a kind in an opening
+MOST = 12  # shapes that are refined at once
+WEAKEST = 0.05  # of the greatest gain
+APART, ALIKE = 0.15, 0.4  # overlap below which two shapes are apart; above which they are tries of one
+EACH, STEPS = 2, 12  # shapes of a kind that are refined in a place; steps of each
+ROUGH, CLEAN = 0.3, 0.06  # what is left of a region, at most, by a shape that may explain it; that does
+PRICE = 0.02  # of a number, in logarithms of what is left
+
+
+@dataclass(frozen=True)
+class Offer:
+    """A layer of one shape for a place in the draw order, and what it does.
+
+    `gain`: by how much the mean squared error falls; `potential`: the most that it could fall in the region it is for;
+    `left`: the share of that which stays, and what becomes worse elsewhere.
+    """
+
+    layer: Group
+    region: Region
+    cover: torch.Tensor  # [P]
+    gain: float
+    potential: float
+    left: float
+
+    @property
+    def kind(self) -> str:
+        """Of its shape."""
+        return self.layer.structure[0].kind
+
+    @property
+    def order(self) -> int:
+        """Its place in the draw order."""
+        return int(self.layer.order)
+
+
+def _best(tries: Sequence[Offer], floor: float) -> Offer:
+    """That which leaves least, where each number has its price."""
+
+    def score(offer: Offer) -> float:
+        left = max(offer.left * offer.potential, 0.1 * floor)
+        return math.log(left) + PRICE * row_width(offer.layer.structure)
+
+    return min(tries, key=score)
+
+
+def offers(
+    places: Sequence[Surroundings], orders: Sequence[int], search: Search, floor: float
+) -> list[Offer]:
+    """Shapes that hardly overlap, each the best for its region; else the one that gains most.
+
+    `places`: the scene as it is seen from each of the `orders`. `floor`: mean squared error that need not be explained.
+    """
+    found = [
+        offer
+        for place, order in zip(places, orders, strict=True)
+        for offer in _searched(place, order, search)
+    ]
+    found.sort(key=lambda offer: (offer.left > ROUGH, -offer.gain))
+    around = dict(zip(orders, places, strict=True))
+    tried = _refined(_tries(found), around, search)
+    best = [_best(tries, floor) for tries in tried if tries]
+    clean = [offer for offer in best if offer.left < CLEAN]
+    return (
+        _apart(sorted(clean, key=lambda offer: offer.left)) or sorted(best, key=lambda offer: -offer.gain)[:1]
+    )
+
+
+@dataclass(frozen=True)
+class Region:
+    """What a shape may be for: an opening, where its colour is wanted, and which part of that a point is in.
+
+    What helps elsewhere is for shapes of other colours: it does not count.
+    """
+
+    opening: Opening  # whose mask asks for nothing where it does not count
+    wanted: torch.Tensor  # [P]: by how much the error falls there
+    labels: torch.Tensor  # [P], from 1; 0 for none
+    counts: torch.Tensor  # [P], 1 or 0
+
+    @classmethod
+    def of(cls, opening: Opening, around: Surroundings) -> Region:
+        """Where the picture has about the opening's colour; where it nowhere has, wherever the colour helps."""
+        gain = opening.mask.gain.clamp_min(0.0)
+        colors = straight(around.target.flatten(1).T)[:, :3]
+        near = (colors - opening.color).square().sum(1) < NEAR
+        near = near if bool((gain * near).any()) else torch.ones_like(near)
+        wanted = gain * near
+        inside = (wanted > REGION * wanted.max()).reshape(around.shape).numpy()
+        beside = max_pool2d(near.reshape(1, 1, *around.shape).float(), 3, 1, 1).flatten() > 0
+        counts = (beside | (gain == 0.0)).float()
+        mask = Mask(opening.mask.strength * counts, opening.mask.amount * counts, opening.mask.rest)
+        return cls(replace(opening, mask=mask), wanted, torch.from_numpy(label(inside)).flatten(), counts)
+
+    def under(self, cover: torch.Tensor) -> torch.Tensor | None:
+        """The part [P] that a shape covers most of, if any."""
+        inside = torch.bincount(self.labels, weights=cover)
+        inside[0] = 0.0
+        return self.labels == int(inside.argmax()) if inside.max() > 0 else None
+
+
+def _searched(around: Surroundings, order: int, search: Search) -> Iterator[Offer]:
+    """All that shapes come to from many starts, where the error falls."""
+    here = torch.tensor([order])
+    regions = [
+        Region.of(opening, around)
+        for color in missing_colors(around)
+        for opening in alone(here, color, search.falloff[0], around)
+    ]
+    openings, wanted = [region.opening for region in regions], [region.wanted for region in regions]
+    proposer = search.proposer(around)
+    for kind in proposer.kinds if openings else ():
+        ends = proposer.optima(kind, openings, wanted, around, STARTS)
+        if ends:
+            rows = torch.cat([layer.rows() for _, layer in ends])
+            yield from _offers_of(rows, ends[0][1], [regions[index] for index, _ in ends], around)
+
+
+def _offers_of(
+    rows: torch.Tensor, like: Group, regions: Sequence[Region], around: Surroundings
+) -> Iterator[Offer]:
+    """What layers with these rows [N, U] gain, of those that do."""
+    structure = like.structure
+    before = around.residual().square().mean(0).flatten()
+    after = around.problem(structure).wrong(rows[..., None]).square().mean(1)
+    covers, _ = rows_coverage(structure, rows[..., None], around.scene.compositing, *around.points)
+    for row, region, cover, rest in zip(rows, regions, covers, after, strict=True):
+        gain, inside = float((before - rest).mean()), region.under(cover)
+        if gain > 0 and inside is not None:
+            potential = float((before * inside).mean())
+            left = float((rest * inside).mean() + ((rest - before).clamp_min(0.0) * ~inside).mean())
+            layer = layer_of(structure, like.order, row[None])
+            yield Offer(layer, region, cover, gain, potential, left / max(potential, 1e-12))
+
+
+def _tries(found: Sequence[Offer]) -> list[list[Offer]]:
+    """The best offers that are apart, each with those of all kinds that cover about the same."""
+    seeds: list[Offer] = []
+    for offer in found:
+        if len(seeds) == MOST or offer.gain < WEAKEST * found[0].gain:
+            break
+        rivals = (seed for seed in seeds if seed.region is offer.region)
+        if all(_overlap(offer.cover, seed.cover) < APART for seed in rivals):
+            seeds.append(offer)
+    groups = []
+    for seed in seeds:
+        kinds: dict[str, list[Offer]] = defaultdict(list)
+        for offer in found:
+            if offer.region is seed.region and _likeness(offer.cover, seed.cover) > ALIKE:
+                kinds[offer.kind].append(offer)
+        groups.append([offer for own in kinds.values() for offer in own[:EACH]])
+    return groups
+
+
+def _refined(
+    tries: Sequence[Sequence[Offer]], around: dict[int, Surroundings], search: Search
+) -> list[list[Offer]]:
+    """The same after some steps of all their numbers; all of a kind at once."""
+    alike: dict[tuple[int, str], list[tuple[int, Offer]]] = defaultdict(list)
+    for index, own in enumerate(tries):
+        for offer in own:
+            alike[offer.order, offer.kind].append((index, offer))
+    made: list[list[Offer]] = [[] for _ in tries]
+    for (order, _), members in alike.items():
+        first, place = members[0][1].layer, around[order]
+        numbers = search.numbers(place, first.structure, lambda slot: True)
+        rows = torch.cat([offer.layer.rows() for _, offer in members])
+        problem = _counted(place.problem(first.structure), [offer.region.counts for _, offer in members])
+        rows, _ = descend(rows, problem, numbers, STEPS, search.tick)
+        for (index, offer), row in zip(members, rows, strict=True):
+            made[index] += _offers_of(row[None], first, [offer.region], place)
+    return made
+
+
+def _counted(problem: Problem, counts: Sequence[torch.Tensor]) -> Problem:
+    """The problem of candidates for each of which only some points count."""
+    weights = torch.stack(list(counts))[:, None]
+    return Problem(lambda rows: problem.wrong(rows) * weights, problem.points)
+
+
+def _apart(ranked: Sequence[Offer]) -> list[Offer]:
+    """The first of those that overlap."""
+    taken: list[Offer] = []
+    for offer in ranked:
+        if all(_overlap(offer.cover, other.cover) < APART for other in taken):
+            taken.append(offer)
+    return taken
+
+
+def _overlap(one: torch.Tensor, other: torch.Tensor) -> float:
+    """The share of the smaller one that both cover."""
+    return float((one * other).sum() / torch.minimum(one.sum(), other.sum()).clamp_min(1e-6))
+
+
+def _likeness(one: torch.Tensor, other: torch.Tensor) -> float:
+    """Intersection over union."""
+    return float(torch.minimum(one, other).sum() / torch.maximum(one, other).sum().clamp_min(1e-6))
+
+
+# --- colours --------------------------------------------------------------------------------------------------
+
+
+def missing_colors(around: Surroundings) -> list[torch.Tensor]:
+    """The straight colours [1, 3] of the picture where most is missing, the worst first."""
+    wrong = around.residual().square().sum(0).flatten()
+    colors = straight(around.target.flatten(1).T)
+    if len(around.target) == 4:
+        wrong = wrong * (colors[:, 3] > 0.5)
+    colors, left, found = colors[:, :3], wrong.clone(), []
+    for _ in range(COLORS):
+        if left.sum() <= LEAST * wrong.sum() or wrong.max() <= 0:
+            break
+        color = common_color(colors, left)
+        near = (colors - color).square().sum(1) < NEAR
+        found.append(color[None])
+        left[near] = 0.0
+    return found
+
+
+def common_color(colors: torch.Tensor, weights: torch.Tensor) -> torch.Tensor:
+    """The colour [3] that is most common among colours [P, 3] by weight [P]: the median around the fullest bin."""
+    bins = (colors * BINS * 0.999).long()
+    keys = (bins[:, 0] * BINS + bins[:, 1]) * BINS + bins[:, 2]
+    inside = keys == torch.bincount(keys, weights=weights, minlength=BINS**3).argmax()
+    middle = (colors * (weights * inside)[:, None]).sum(0) / (weights * inside).sum()
+    near = (colors - middle).square().sum(1) < NEAR
+    return colors[near].median(0).values if bool(near.any()) else middle

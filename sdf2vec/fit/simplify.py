@@ -1,0 +1,158 @@
+"""The least that does the job, shape by shape: a circle for an ellipse, opaque for translucent, sharp for soft.
+
+A change is tried, its other numbers descend a little, and it is kept where the picture stays as near.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterator
+from dataclasses import replace
+from functools import cache
+
+import torch
+
+from ..expr import const
+from ..graph import scalarize
+from ..layer import LOOK, Part, Slot, slots
+from ..lower.torch import Tensors, compile_torch
+from ..render.tensors import Group, SceneTensors
+from ..shapes import KINDS
+from ..units import ANGLE, OPACITY
+from .joining import Search, inserted
+from .sparse import error_of, layer_at
+from .surroundings import Surroundings, View
+
+STEPS = 10  # of a changed layer
+RISE = 1.02  # of the error, at most, by one change
+UPRIGHT = 0.05  # radians off, at most, of what is tried upright
+NEARLY_OPAQUE = 0.3  # on one colour, opacity and colour may stand for each other
+SOFTEST = 4.0  # pixels of falloff, at most, of what is tried sharp
+
+Change = tuple[Group, tuple[Slot, ...]]  # a layer, and what of it must stay
+
+
+def simplified(scene: SceneTensors, view: View, search: Search, worst: float) -> SceneTensors:
+    """The scene with simpler layers, while its mean squared error hardly rises or stays below the worst."""
+    limit = max(worst, RISE * error_of(scene, view))
+    for order in range(scene.layer_count):
+        kept: tuple[Slot, ...] = ()
+        for change in CHANGES:
+            for layer, still in change(layer_at(scene, order), view):
+                tried = _tried(scene, layer, (*kept, *still), view, search)
+                if error_of(tried, view) <= limit:
+                    scene, kept = tried, (*kept, *still)
+                    break
+    return scene
+
+
+def _tried(
+    scene: SceneTensors, layer: Group, still: tuple[Slot, ...], view: View, search: Search
+) -> SceneTensors:
+    """The scene with a layer whose other numbers have moved a little."""
+    around = Surroundings.of(scene, int(layer.order), view)
+    tried = search.trained(layer, around, STEPS, lambda slot: slot not in still)
+    return inserted(scene, replace(tried.layer, order=layer.order))
+
+
+# --- changes --------------------------------------------------------------------------------------------------
+
+
+def _circle(layer: Group, view: View) -> Iterator[Change]:
+    """One shape as a circle of about its extent: what is mostly hidden may be any kind, and this has fewest numbers."""
+    if len(layer.structure) > 1 or layer.structure[0].kind == "circle":
+        return
+    kind = KINDS[layer.structure[0].kind]
+    if kind.patch is None:
+        center, radius = middle_of(layer)
+        yield _of_kind("circle", layer, {"center": center, "radius": radius}), ()
+
+
+def middle_of(layer: Group) -> tuple[torch.Tensor, torch.Tensor]:
+    """Where the only shape of a layer is [1, 2], and half the mean of its sides [1, 1]."""
+    low_x, low_y, high_x, high_y = _extent(layer.structure[0].kind)(*layer.shape(0))
+    center = torch.stack([low_x + high_x, low_y + high_y], dim=1) / 2
+    return center, (high_x - low_x + high_y - low_y)[:, None] / 4
+
+
+@cache
+def _extent(kind: str) -> Callable[..., Tensors]:
+    """The box around a shape from its numbers."""
+    return compile_torch(
+        scalarize(KINDS[kind].extent(const(0.0), *KINDS[kind].variables())), KINDS[kind].scalars()
+    )
+
+
+def _of_kind(kind: str, layer: Group, own: dict[str, torch.Tensor]) -> Group:
+    """The layer of one shape as another kind, with these numbers; the rest is what it was."""
+    structure = (Part(kind, layer.structure[0].paint),)
+    names = {(slot.part, slot.parameter.name): values for slot, values in layer.values.items()}
+    values = {
+        slot: own.get(slot.parameter.name, names.get((slot.part, slot.parameter.name)))
+        for slot in slots(structure)
+    }
+    return Group(
+        structure, layer.order, {slot: tensor for slot, tensor in values.items() if tensor is not None}
+    )
+
+
+def _upright(layer: Group, view: View) -> Iterator[Change]:
+    """Angles next to a right angle as just that; a quarter turn is a change of sides, so that 0 will do."""
+    for slot, turn in layer.values.items():
+        if slot.parameter.unit is not ANGLE or slot.part is None:
+            continue
+        quarters = round(float(turn) / (math.pi / 2))
+        if abs(float(turn) - quarters * math.pi / 2) > UPRIGHT:
+            continue
+        turned = _with(layer, slot, 0.0)
+        yield (_sides_swapped(turned, slot.part) if quarters % 2 else turned), (slot,)
+
+
+def _sides_swapped(layer: Group, part: int) -> Group:
+    """The layer with the extents of one of its shapes along x and y exchanged."""
+    values = {
+        slot: tensor.flip(1) if slot.part == part and _is_extent(slot) else tensor
+        for slot, tensor in layer.values.items()
+    }
+    return Group(layer.structure, layer.order, values)
+
+
+def _is_extent(slot: Slot) -> bool:
+    return slot.parameter.unit.name == "length" and slot.parameter.width == 2
+
+
+def _opaque(layer: Group, view: View) -> Iterator[Change]:
+    slot = Slot(None, LOOK[0])
+    if slot.parameter.unit is OPACITY and float(layer.opacity) >= NEARLY_OPAQUE:
+        yield _with(layer, slot, 1.0), (slot,)
+
+
+def _sharp(layer: Group, view: View) -> Iterator[Change]:
+    slot = Slot(None, LOOK[1])
+    pixel = 1.0 / min(view.target.shape[1:])
+    if KINDS[layer.structure[0].kind].patch is None and float(layer.falloff) <= SOFTEST * pixel:
+        yield _with(layer, slot, 0.0), (slot,)
+
+
+def _unrounded(layer: Group, view: View) -> Iterator[Change]:
+    for slot in layer.values:
+        if slot.part is not None and slot.parameter.name == "corner_radius":
+            yield _with(layer, slot, 0.0), (slot,)
+
+
+def _with(layer: Group, changed: Slot, value: float) -> Group:
+    """The layer with one number."""
+    values = {
+        slot: torch.full_like(tensor, value) if slot == changed else tensor
+        for slot, tensor in layer.values.items()
+    }
+    return Group(layer.structure, layer.order, values)
+
+
+CHANGES: tuple[Callable[[Group, View], Iterator[Change]], ...] = (
+    _circle,
+    _unrounded,
+    _upright,
+    _opaque,
+    _sharp,
+)

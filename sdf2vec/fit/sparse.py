@@ -1,0 +1,225 @@
+"""Few shapes: those that a picture made of shapes is made of, found in rounds, on the CPU.
+
+Each round offers shapes to what is missing, puts them in, descends with all of them, and takes out what is not needed.
+A photograph is not made of few shapes: where too many would be needed the search gives up.
+"""
+
+from __future__ import annotations
+
+import math
+import operator
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+from functools import partial
+
+import torch
+
+from ..render import fused
+from ..render.tensors import Group, SceneTensors
+from .adam import adam_over
+from .constraints import enforce_min_thickness, project
+from .joining import Search, detached, inserted
+from .offers import Offer, offers
+from .presets import Phase
+from .surroundings import Surroundings, View, some
+
+FLOOR = 10**-4.4  # mean squared error, 44 dB: below it nothing is missing
+FEW = 24  # layers that are descended one by one, too
+EACH = 8  # steps of such a descent
+JOINT = Phase("joint", 60, 0, rate=0.3, end_rate=0.02)
+AFTER = Phase("after", 40, 0, rate=0.2, end_rate=0.02)  # one layer was taken out
+LAST = Phase("last", 150, 0, rate=0.3, end_rate=0.01)
+MOVED = 0.98  # of the error, at most, after a layer was moved in the draw order
+HELPS = 0.85  # of the error before, at most, of a round that is kept
+NEEDLESS, HOPEFUL = 1.05, 6.0  # how much the error may rise by a layer taken out: after a descent; before it
+TRIED = 2  # layers that matter least, of which one may be taken out
+
+
+@dataclass(frozen=True)
+class Sizes:
+    """The picture at the sizes that are looked at: where shapes are searched, where all descend, at the end."""
+
+    search: View
+    joint: View
+    last: View
+
+
+@dataclass(frozen=True)
+class Round:
+    """What a round has come to: the scene, its mean squared error, and that before."""
+
+    scene: SceneTensors
+    error: float
+    before: float
+
+
+def grow(
+    scene: SceneTensors, sizes: Sizes, search: Search, most: int, floor: float = FLOOR
+) -> Iterator[Round]:
+    """The scene after each round, until it has as many layers as `most`, is near enough, or is helped no more."""
+    error = error_of(scene, sizes.joint)
+    while scene.layer_count < most and error > floor:
+        found = _offers(scene, sizes.search, search, floor)[: most - scene.layer_count]
+        if not found:
+            return
+        made = _descended(_with(scene, found), sizes, search)
+        made = pruned(made, sizes, search, floor)
+        now = error_of(made, sizes.joint)
+        if now > HELPS * error and made.layer_count >= scene.layer_count:
+            return
+        yield Round(made, now, error)
+        scene, error = made, now
+
+
+def finished(scene: SceneTensors, sizes: Sizes, search: Search) -> SceneTensors:
+    """The scene after a last descent at the largest size."""
+    made = descended(scene, sizes.last, search, LAST)
+    return min(scene, made, key=partial(error_of, view=sizes.last))
+
+
+@torch.no_grad()
+def error_of(scene: SceneTensors, view: View) -> float:
+    """The weighted mean squared error."""
+    return float(_wrong(scene, view))
+
+
+def _wrong(scene: SceneTensors, view: View) -> torch.Tensor:
+    channels, height, width = view.target.shape
+    wrong = fused.composite(scene, width, height, channels) - view.target
+    return (wrong if view.weights is None else wrong * view.weights).square().mean()
+
+
+def _offers(scene: SceneTensors, view: View, search: Search, floor: float) -> list[Offer]:
+    """New layers, for the top of the scene or its bottom; the draw order is that of the scene without the others."""
+    orders = sorted({0, scene.layer_count})
+    places = [Surroundings.of(_opened(scene, order), order, view) for order in orders]
+    return offers(places, orders, search, floor)
+
+
+def _opened(scene: SceneTensors, order: int) -> SceneTensors:
+    """The scene with room for a layer at a place of the draw order."""
+    groups = [replace(group, order=group.order + (group.order >= order)) for group in scene.groups]
+    return replace(scene, groups=groups)
+
+
+def _with(scene: SceneTensors, found: list[Offer]) -> SceneTensors:
+    """The scene with new layers."""
+    for offer in found:
+        order = scene.layer_count if offer.order else 0
+        scene = inserted(_opened(scene, order), replace(offer.layer, order=torch.tensor([order])))
+    return scene
+
+
+def without(scene: SceneTensors, order: int) -> SceneTensors:
+    """The scene without the layer at a place of the draw order."""
+    fewer = some(scene, partial(operator.ne, order))
+    groups = [replace(group, order=group.order - (group.order > order).long()) for group in fewer.groups]
+    return replace(fewer, groups=groups)
+
+
+# --- descents -------------------------------------------------------------------------------------------------
+
+
+def _descended(scene: SceneTensors, sizes: Sizes, search: Search) -> SceneTensors:
+    """The scene after a descent of each layer, where they are few, and of all together."""
+    if scene.layer_count <= FEW:
+        scene = _each_improved(scene, sizes.search, search)
+    made = descended(scene, sizes.joint, search, JOINT)
+    made = min(made, scene, key=partial(error_of, view=sizes.joint))
+    return _reordered(made, sizes.joint) if made.layer_count <= FEW else made
+
+
+def _each_improved(scene: SceneTensors, view: View, search: Search) -> SceneTensors:
+    """The scene with each layer at its best place of the draw order, and nearer to what it should be."""
+    scene = _reordered(scene, view)
+    for order in range(scene.layer_count):
+        scene = _improved(scene, order, view, search)
+    return scene
+
+
+def _reordered(scene: SceneTensors, view: View) -> SceneTensors:
+    """The scene with each layer at the place of the draw order where the error is least."""
+    error = error_of(scene, view)
+    for order in range(scene.layer_count):
+        layer, rest = layer_at(scene, order), without(scene, order)
+        for place in range(scene.layer_count):
+            moved = inserted(_opened(rest, place), replace(layer, order=torch.tensor([place])))
+            found = error_of(moved, view)
+            if found < MOVED * error:
+                scene, error = moved, found
+    return scene
+
+
+@torch.no_grad()
+def _improved(scene: SceneTensors, order: int, view: View, search: Search) -> SceneTensors:
+    """The scene with one layer nearer to what it should be."""
+    layer, around = layer_at(scene, order), Surroundings.of(scene, order, view)
+    tried = search.trained(layer, around, EACH, lambda slot: True)
+    better = tried.error < around.error(layer)
+    return inserted(scene, replace(tried.layer, order=layer.order)) if better else scene
+
+
+def layer_at(scene: SceneTensors, order: int) -> Group:
+    """The layer at a place of the draw order."""
+    (layer,) = some(scene, partial(operator.eq, order)).groups
+    return layer
+
+
+def descended(scene: SceneTensors, view: View, search: Search, phase: Phase) -> SceneTensors:
+    """A copy of the scene after a phase of steps down the squared error, all numbers together."""
+    scene = detached(scene)
+    optimizer = adam_over(scene)
+    with torch.enable_grad():
+        for rate in phase.rates():
+            optimizer.zero_grad()
+            error = _wrong(scene, view)
+            error.backward()
+            optimizer.step(rate)
+            project(scene, search.pixel, search.falloff)
+            search.tick(float(error.detach()))
+    enforce_min_thickness(scene, search.pixel)
+    return detached(scene)
+
+
+# --- what is not needed ---------------------------------------------------------------------------------------
+
+
+def pruned(scene: SceneTensors, sizes: Sizes, search: Search, worst: float = FLOOR) -> SceneTensors:
+    """The scene without layers that it does as well without, or stays within the worst mean squared error."""
+    error = error_of(scene, sizes.joint)
+    while scene.layer_count:
+        fewer = _fewer(scene, sizes, search, max(NEEDLESS * error, worst))
+        if fewer is None:
+            return scene
+        scene, error = fewer, error_of(fewer, sizes.joint)
+    return scene
+
+
+def _fewer(scene: SceneTensors, sizes: Sizes, search: Search, worst: float) -> SceneTensors | None:
+    """The scene without one of the layers that matter least, if its error is at most the worst."""
+    tried = [without(scene, order) for order in range(scene.layer_count)]
+    ranked = sorted((error_of(fewer, sizes.joint), i) for i, fewer in enumerate(tried))[:TRIED]
+    for error, index in ranked:
+        fewer = tried[index]
+        if error > HOPEFUL * worst:
+            return None
+        if error > worst and fewer.layer_count:
+            if fewer.layer_count <= FEW // 2:
+                fewer = _each_improved(fewer, sizes.search, search)
+            fewer = descended(fewer, sizes.joint, search, AFTER)
+            error = error_of(fewer, sizes.joint)
+        if error <= worst:
+            return fewer
+    return None
+
+
+def needed(made: Round, flat: bool, floor: float) -> float:
+    """About how many more layers the picture needs: in flat colours each as much as now, else ever less."""
+    gained = made.before - made.error
+    if made.error <= floor:
+        return 0.0
+    if gained <= 0:
+        return math.inf
+    if flat:
+        return made.error / gained
+    return math.log(made.error / floor) / math.log(made.before / made.error)

@@ -1,0 +1,167 @@
+"""No more shapes than a picture needs: of pictures that resvg draws, whose shapes are known; and what is reported."""
+
+import math
+
+import numpy as np
+import pytest
+import torch
+
+from sdf2vec import Sdf2vecError, fit
+from sdf2vec.api import fitted
+from sdf2vec.engines import resvg
+from sdf2vec.fit.auto import ground_of, is_flat
+from sdf2vec.fit.settings import settings_of
+from sdf2vec.image import Picture, resize
+from sdf2vec.quality import quality
+from tests.fit.fitting import RED, remember
+from tests.fit.fitting import picture as soft_picture
+
+WHITE = '<rect width="100%" height="100%" fill="white"/>'
+DISC = '<circle cx="44" cy="50" r="24" fill="#d02040"/>'
+UNDER = '<circle cx="40" cy="40" r="22" fill="#2040d0"/>'
+OVER = '<rect x="38" y="44" width="40" height="30" fill="#10a050"/>'
+TRIANGLE = '<polygon points="70,8 90,34 60,30" fill="#e0a010"/>'
+
+
+@pytest.fixture
+def drawn(require_engine):
+    """The picture that resvg draws of SVG elements."""
+    require_engine("resvg")
+
+    def draw(shapes, width=96, height=96):
+        text = f'<svg xmlns="http://www.w3.org/2000/svg" width="{width}" height="{height}">{shapes}</svg>'
+        pixels = resvg.render(text, width, height)
+        opaque = bool((pixels[..., 3] == 1.0).all())
+        return Picture(np.ascontiguousarray(pixels[..., : 3 if opaque else 4], dtype=np.float32))
+
+    return draw
+
+
+def noise():
+    """Nothing that a few shapes could be."""
+    coarse = np.random.default_rng(0).random((8, 12, 3), dtype=np.float32)
+    return Picture(np.ascontiguousarray(resize(coarse, 48, 32)))
+
+
+def kinds_of(scene):
+    return sorted(shape.kind for layer in scene.layers for shape in layer.shapes)
+
+
+@pytest.mark.parametrize(
+    ("shapes", "kinds", "width"),
+    [
+        (WHITE, [], 96),
+        (WHITE + DISC, ["circle"], 96),
+        (WHITE + UNDER + OVER + TRIANGLE, ["box", "circle", "triangle"], 110),
+        (DISC + TRIANGLE, ["circle", "triangle"], 96),  # on nothing
+    ],
+    ids=["nothing", "a disc", "three shapes, one partly hidden", "with alpha"],
+)
+def test_the_shapes_of_a_drawing_are_found(drawn, shapes, kinds, width):
+    picture = drawn(shapes, width)
+    found = fitted(picture)
+    assert kinds_of(found.scene) == kinds
+    assert quality(found.scene, picture).psnr >= 40
+    assert found.reason.startswith(f"{len(kinds)} shapes")
+    assert found.met
+
+
+def test_what_is_found_is_as_simple_as_drawn(drawn):
+    """A sharp, opaque, upright box says so in its numbers, which `svg` writes as a plain rectangle."""
+    scene = fit(drawn(WHITE + OVER))
+    (layer,) = scene.layers
+    (shape,) = layer.shapes
+    assert (layer.opacity, layer.falloff) == (1.0, 0.0)
+    assert shape.kind == "box"
+    x, y, half_width, half_height, angle, rounding = shape.parameters
+    assert (angle, rounding) == (0.0, 0.0)
+    assert np.allclose((x * 96 + 48, y * 96 + 48), (58, 59), atol=0.3)
+    assert np.allclose((half_width * 96, half_height * 96), (20, 15), atol=0.3)
+    assert np.allclose(shape.color, (0x10 / 255, 0xA0 / 255, 0x50 / 255), atol=0.01)
+
+
+@pytest.mark.parametrize("seed", range(2))
+def test_one_circle_finds_a_disc(drawn, seed):
+    picture = drawn(WHITE + DISC)
+    scene = fit(picture, 1, kind="circle", preset="fast", seed=seed)
+    assert kinds_of(scene) == ["circle"]
+    assert quality(scene, picture).psnr >= 40
+
+
+def test_few_shapes_are_exactly_as_many_as_told(drawn):
+    scene = fit(drawn(WHITE + DISC), 3, preset="fast")
+    assert scene.shape_count == 3
+
+
+def test_what_is_no_drawing_gets_as_many_shapes_as_are_allowed():
+    found = fitted(noise(), max_shapes=12, preset="fast")
+    assert found.scene.shape_count == 12
+    assert "--max-shapes" in found.reason
+    assert found.scene == fit(noise(), 12, preset="fast")
+
+
+def test_a_target_is_met_by_fewer_shapes():
+    picture = noise()
+    all_shapes = quality(fit(picture, 64, preset="fast"), picture).psnr
+    found = fitted(picture, max_shapes=64, preset="fast", target_psnr=all_shapes - 4)
+    assert found.met
+    assert quality(found.scene, picture).psnr >= all_shapes - 4
+    assert found.scene.shape_count < 60
+    assert "PSNR" in found.reason
+
+
+@pytest.mark.parametrize("target", [{"target_psnr": 90.0}, {"target_flip": 0.001}])
+def test_a_target_out_of_reach_is_said(target):
+    found = fitted(noise(), max_shapes=8, preset="fast", **target)
+    assert not found.met
+    assert found.scene.shape_count == 8
+    assert "not reached" in found.reason
+
+
+def test_a_number_and_a_target_are_refused():
+    with pytest.raises(Sdf2vecError, match="--shapes auto"):
+        settings_of(8, target_psnr=30)
+
+
+@pytest.mark.parametrize("shapes", ["few", 0, -1, 2.5])
+def test_other_numbers_are_refused(shapes):
+    with pytest.raises(Sdf2vecError, match="must be auto or a whole number"):
+        settings_of(shapes)
+
+
+def test_the_search_ends_when_told_and_keeps_what_it_has(drawn):
+    picture = drawn(WHITE + UNDER + OVER + TRIANGLE)
+    seen: list[object] = []
+    scene = fit(picture, callback=lambda progress: remember(seen)(progress) or len(seen) == 3)
+    assert len(seen) == 3
+    assert scene.shape_count == 0
+
+
+def test_the_same_seed_finds_the_same(drawn):
+    picture = drawn(WHITE + DISC + TRIANGLE)
+    assert fit(picture, seed=1) == fit(picture, seed=1)
+
+
+def test_drawings_are_told_from_photographs():
+    flat = np.full((32, 48, 3), 0.5, np.float32)
+    flat[8:20, 10:30] = RED
+    assert is_flat(Picture(flat))
+    assert not is_flat(noise())
+    assert is_flat(Picture(np.zeros((1, 1, 3), np.float32)))
+
+
+def test_the_ground_is_the_colour_that_dominates():
+    """Not the mean, which would have to be painted over everywhere."""
+    target = np.full((3, 20, 20), 0.9, np.float32)
+    target[:, :8] = 0.1
+    assert np.allclose(ground_of(torch.from_numpy(target))[:3], 0.9, atol=1e-6)
+    assert ground_of(torch.zeros(4, 5, 5)).tolist() == [0.0] * 4
+    shades = torch.linspace(0, 1, 300).reshape(1, 15, 20).repeat(3, 1, 1)
+    assert math.isclose(float(ground_of(shades)[0]), 0.5, abs_tol=0.01)
+
+
+def test_a_soft_picture_takes_few_shapes():
+    picture = soft_picture()
+    found = fitted(picture)
+    assert found.scene.shape_count <= 24
+    assert quality(found.scene, picture).psnr >= 35
