@@ -41,7 +41,7 @@ UNLIKELY = 1.5  # of the most shapes: a picture that needs more is no drawing
 SOFT_MOST = 48  # shapes of a soft drawing
 GOOD = 10**-3.5  # mean squared error, 35 dB, of what is surely found
 DOMINANT = 0.15  # share of the most common colour, of a picture that has a ground
-TRIES = 3  # fits for a target
+TRIES = 4  # fits for a target
 SLOPE = 1.7  # dB for twice the shapes, about
 
 
@@ -228,20 +228,22 @@ def _painted(picture: Picture, settings: Settings, callback: Callback) -> Fitted
 
 
 def _fewer(picture: Picture, settings: Settings, scene: Scene, callback: Callback) -> Iterator[Scene]:
-    """Scenes of ever fewer shapes that meet the target."""
-    low, high, missed = 0, scene.shape_count, _missed(quality(scene, picture), settings)
+    """Scenes of ever fewer shapes that meet the target: what a number misses goes with its logarithm, about."""
+    high, above = scene.shape_count, _missed(quality(scene, picture), settings)
+    low, below = 0, 0.0
     for _ in range(TRIES):
-        count = round(high * 2 ** (missed / SLOPE))
-        count = min(max(count, low + 1), high - 1)
-        if count <= low or count >= high:
+        part = below / (below - above) if low else 1.0 + above / SLOPE / max(math.log2(high), 1.0)
+        guess = max(low, 1) * (high / max(low, 1)) ** min(max(part, 0.0), 1.0)
+        count = min(max(math.ceil(guess), low + 1), high - 1)
+        if count <= low:
             return
         tried = fit_picture(picture, structs.replace(settings, shapes=count), callback)
         missed = _missed(quality(tried, picture), settings)
         if missed <= 0:
-            high = count
+            high, above = count, missed
             yield tried
         else:
-            low, missed = count, -0.5 * SLOPE * math.log2(high / count)
+            low, below = count, missed
 
 
 def _missed(seen: Quality, settings: Settings) -> float:
