@@ -34,9 +34,9 @@ def choice(title: str, description: str, known: Collection[str]) -> msgspec.Meta
     return msgspec.Meta(title=title, description=description, extra={"known": known})
 
 
-def plain(description: str, metavar: str | None = None) -> msgspec.Meta:
-    """Anything: a switch, or what is read elsewhere."""
-    return msgspec.Meta(description=description, extra={"metavar": metavar})
+def plain(description: str, metavar: str | None = None, short: str = "") -> msgspec.Meta:
+    """Anything: a switch, or what is read elsewhere; `short` is a letter that is a flag, too."""
+    return msgspec.Meta(description=description, extra={"metavar": metavar, "short": short})
 
 
 @dataclass(frozen=True)
@@ -58,6 +58,11 @@ class Option:
     @property
     def _extra(self) -> dict[str, Any]:
         return self.meta.extra or {}
+
+    @property
+    def flag(self) -> str:
+        """How it is called on the command line."""
+        return f"--{self.name.replace('_', '-')}"
 
     @property
     def help(self) -> str:
@@ -88,8 +93,9 @@ class Option:
         if self.type is not bool:
             form = {"type": self.type if self.type in NUMBERS else str}
             form["metavar"] = self._extra.get("metavar")
-        flag = f"--{self.name.replace('_', '-')}"
-        parser.add_argument(flag, default=argparse.SUPPRESS, help=self.help.replace("%", "%%"), **form)
+        short = [f"-{self._extra['short']}"] if self._extra.get("short") else []
+        told = self.help.replace("%", "%%")
+        parser.add_argument(*short, self.flag, default=argparse.SUPPRESS, help=told, **form)
 
 
 @cache

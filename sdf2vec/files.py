@@ -40,7 +40,7 @@ def write_atomically(path: str | os.PathLike[str], data: bytes) -> None:
 
 
 def require_writable(path: str | os.PathLike[str]) -> None:
-    """Raises Sdf2vecError where `write_atomically` is bound to fail: before hours of work, say. Writes nothing."""
+    """Raises Sdf2vecError where `write_atomically` is bound to fail: before hours of work. Leaves nothing behind."""
     try:
         target = Path(os.path.realpath(path))
         if target.is_dir():
@@ -57,8 +57,21 @@ def _require_folder(folder: Path) -> None:
         folder = folder.parent
     if not folder.is_dir():
         raise NotADirectoryError
-    if not os.access(folder, os.W_OK | os.X_OK):
-        raise PermissionError
+    _write_and_remove(folder)
+
+
+def _write_and_remove(folder: Path) -> None:
+    """Tries it: what a folder's mode says is not true of every user and every file system."""
+    tried = folder / _temporary_name()
+    try:
+        tried.touch(exist_ok=False)
+    finally:
+        with contextlib.suppress(OSError):
+            tried.unlink()
+
+
+def _temporary_name() -> str:
+    return f".sdf2vec-{secrets.token_hex(8)}.tmp"
 
 
 def one_line(text: str) -> str:
@@ -67,7 +80,7 @@ def one_line(text: str) -> str:
 
 
 def _write_and_rename(target: Path, data: bytes) -> None:
-    beside = target.parent / f".sdf2vec-{secrets.token_hex(8)}.tmp"
+    beside = target.parent / _temporary_name()
     try:
         with open(beside, "xb") as stream:
             stream.write(data)

@@ -11,14 +11,14 @@ import io
 import os
 import threading
 import warnings
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 from typing import Any, BinaryIO
 
 import numpy as np
 from numpy.typing import NDArray
-from PIL import Image, ImageChops, ImageCms, ImageOps
+from PIL import ExifTags, Image, ImageChops, ImageCms, ImageOps, PngImagePlugin
 
 from sdf2vec.errors import Sdf2vecError
 from sdf2vec.files import one_line
@@ -390,9 +390,35 @@ def encode_png(pixels: NDArray[np.floating[Any]]) -> bytes:
 
     Raises Sdf2vecError for NaN.
     """
+    return encode(pixels, "PNG")
+
+
+def encode(pixels: NDArray[np.floating[Any]], form: str, made_by: str = "") -> bytes:
+    """The same in one of the formats PNG, JPEG (without alpha) and WEBP, whose metadata says what made it."""
     if np.isnan(pixels).any():
         raise Sdf2vecError("the picture to write holds NaN")
     levels = np.rint(np.clip(pixels, 0, 1) * 255).astype(np.uint8)
     stream = io.BytesIO()
-    Image.fromarray(levels).save(stream, "PNG")
+    Image.fromarray(levels).save(stream, form, **_SAVED[form](made_by))
     return stream.getvalue()
+
+
+def _png_text(made_by: str) -> dict[str, Any]:
+    text = PngImagePlugin.PngInfo()
+    if made_by:
+        text.add_text("Software", made_by)
+    return {"pnginfo": text}
+
+
+def _exif(made_by: str) -> Image.Exif:
+    exif = Image.Exif()
+    if made_by:
+        exif[ExifTags.Base.Software] = made_by
+    return exif
+
+
+_SAVED: dict[str, Callable[[str], dict[str, Any]]] = {
+    "PNG": _png_text,
+    "JPEG": lambda made_by: {"quality": 92, "subsampling": 0, "comment": made_by},
+    "WEBP": lambda made_by: {"quality": 92, "method": 4, "exif": _exif(made_by)},
+}

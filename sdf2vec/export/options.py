@@ -16,7 +16,7 @@ LAYOUTS = ("auto", "readable", "table", "tiled", "packed", "data")
 SVG_PROFILES = ("filters", "portable")
 
 
-Size = Annotated[int, number("size in pixels", "PIXELS", 1, 16384, "shortest side of a PNG")]
+Size = Annotated[int, number("size in pixels", "PIXELS", 1, 16384, "shortest side of a PNG, JPEG or WebP")]
 SizeLimit = Annotated[
     int, number("SVG size limit in bytes", "BYTES", 1, None, "draw an SVG coarser where it would be larger")
 ]

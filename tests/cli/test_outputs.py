@@ -35,14 +35,14 @@ def test_names_of_all_outputs(folder, run):
 def test_the_summary_names_the_quality_and_every_file(folder, run):
     lines = run("photo.jpg", *SHORT, "--emit", "json", "--emit", "svg,png").out.decode().splitlines()
     assert re.fullmatch(
-        r"photo\.jpg: 24 x 16, 3 shapes, PSNR \d+\.\d\d dB, FLIP 0\.\d{4}, \d+\.\d s", lines[0]
+        r"photo\.jpg: 24 x 16, 3 shapes, PSNR \d+\.\d\d dB, FLIP 0\.\d{4}, fitted in \d+\.\d s", lines[0]
     )
-    assert [line.split(":")[0] for line in lines[1:]] == [
+    assert [line.split(":")[0] for line in lines[1:-1]] == [
         "  photo.scene.json",
         "  photo.svg",
         "  photo.render.png",
     ]
-    sizes = [int(line.split(": ")[1].split()[0].replace(",", "")) for line in lines[1:]]
+    sizes = [int(line.split(": ")[1].split()[0].replace(",", "")) for line in lines[1:-1]]
     assert sizes == [os.path.getsize(name) for name in ("photo.scene.json", "photo.svg", "photo.render.png")]
 
 
@@ -128,6 +128,7 @@ def test_output_is_a_file_for_one_target(folder, run):
     [
         ("svg", "there", "there/photo.svg"),
         ("svg", "new/", "new/photo.svg"),
+        ("svg", "new", "new/photo.svg"),
         ("json,svg", "new", "new/photo.svg"),
     ],
 )
@@ -136,6 +137,35 @@ def test_output_is_a_folder_otherwise(folder, run, emit, out, expected):
     assert run("photo.jpg", *SHORT, "--emit", emit, "-o", out).code == 0
     assert (folder / expected).exists()
     assert len(names(folder)) == 1 + len(emit.split(","))
+
+
+def test_the_ending_of_an_output_says_what_it_is(folder, run):
+    outs = ("a.svg", "b.JPG", "c.html", "d.json", "e.webp", "f.shadertoy.glsl", "g.wgsl", "rest/")
+    outcome = run("photo.jpg", *SHORT, *(word for out in outs for word in ("-o", out)))
+    assert outcome.code == 0
+    assert names(folder) == sorted([*outs[:-1], "rest/photo.glsl", "photo.jpg"])
+    ElementTree.parse(folder / "a.svg")
+    assert [Image.open(folder / name).format for name in ("b.JPG", "e.webp")] == ["JPEG", "WEBP"]
+    assert "<!DOCTYPE html>" in (folder / "c.html").read_text()
+    assert sdf2vec.load(folder / "d.json").shape_count == 3
+    assert "mainImage" in (folder / "f.shadertoy.glsl").read_text()
+    assert "@fragment" in (folder / "g.wgsl").read_text()
+
+
+def test_a_target_with_a_file_and_the_others_in_a_folder(folder, run):
+    assert run("photo.jpg", *SHORT, "--emit", "glsl,svg,json", "-o", "x/y.svg", "-o", "out").code == 0
+    assert names(folder) == ["out/photo.glsl", "out/photo.scene.json", "photo.jpg", "x/y.svg"]
+
+
+def test_a_transparent_render_lies_on_white_where_there_is_no_alpha(folder, run):
+    shape = sdf2vec.Shape.of("circle", (1, 0, 0), center=(0, 0), radius=0.25)
+    sdf2vec.save(sdf2vec.Scene(24, 24, (sdf2vec.Layer((shape,), 0.01),), None), "disc.json")
+    outcome = run("render", "disc.json", "-o", "disc.jpg", "--size", "48")
+    assert outcome.code == 0
+    assert b"on white" in outcome.out
+    with Image.open("disc.jpg") as drawn:
+        assert (drawn.format, drawn.mode, drawn.size) == ("JPEG", "RGB", (48, 48))
+        assert np.abs(np.array(drawn, int)[[0, 24], [0, 24]] - [[255, 255, 255], [255, 0, 0]]).max() <= 3
 
 
 def test_streams_carry_nothing_but_the_export(folder, run):
@@ -173,7 +203,7 @@ def test_names_with_strange_characters(folder, run):
         os.rename(folder / "x.png", folder / name)
     outcome = run(*strange, *SHORT, "--emit", "glsl,svg")
     assert outcome.code == 0
-    assert outcome.out.count(b"\n") == 3 * 4
+    assert outcome.out.count(b"\n") == 3 * 5
     for name in strange:
         stem = name.removesuffix(".png")
         ElementTree.parse(folder / f"{stem}.svg")
@@ -249,7 +279,7 @@ def test_unusual_pictures(folder, run, name, image, note):
     lines = outcome.out.decode().splitlines()
     if note:
         assert lines[0].startswith(f"{name}: {note}")
-    assert lines[-2].startswith(f"{name}: 24 x 16, 3 shapes")
+    assert lines[-3].startswith(f"{name}: 24 x 16, 3 shapes")
 
 
 def test_notes_stay_out_of_an_export_on_standard_output(folder, run):

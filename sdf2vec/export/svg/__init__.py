@@ -11,7 +11,7 @@ from ...deferred import deferred
 from ...errors import Sdf2vecError
 from ...files import one_line
 from ...scene import Scene
-from ..exported import Exported
+from ..exported import MARK, Exported
 from ..options import Accepts, Options
 from .layers import drawing
 from .plan import DETAILS, Detail, Planner
@@ -20,6 +20,7 @@ from .writer import MARGINS, Style, written
 PORTABLE = "portable"
 ACCEPTED = ("over",)
 CREATED = re.compile(rb"(/CreationDate \(D:)([^)]*)")
+PRODUCER = re.compile(rb"(?<=/Producer \()(cairo [\d.]+) \(https?://cairographics\.org\)(?=\))")
 
 svg2pdf: Callable[..., bytes] = deferred("cairosvg", "svg2pdf")
 
@@ -73,10 +74,10 @@ def pdf(scene: Scene, options: Options) -> Exported:
         found = svg2pdf(bytestring=made.raw)
     except OSError:  # the package is there, the system's library is not
         raise Sdf2vecError("pdf: needs cairo: apt-get install libcairo2") from None
-    undated = CREATED.sub(
-        lambda found: found[1] + b"0" * len(found[2]), found
-    )  # the same scene, the same file
-    return replace(made, data=undated)
+    # The same scene, the same file; and who made it. Places in the file stay where they are.
+    undated = CREATED.sub(lambda match: match[1] + b"0" * len(match[2]), found)
+    said = f"{MARK}, ".encode()
+    return replace(made, data=PRODUCER.sub(lambda match: (said + match[1]).ljust(len(match[0])), undated))
 
 
 def _planner(scene: Scene, profile: str) -> Planner:

@@ -18,6 +18,7 @@ import svgwrite
 
 from ...outlines import EllipseOutline, Point, PolygonOutline, RectangleOutline
 from ...scene import Color
+from ..exported import MARK
 from .canvas import Points, pairs
 from .display import (
     Contour,
@@ -62,7 +63,7 @@ def written(drawing: Drawing, title: str, style: Style) -> str:
     inner = _Writer(drawing, style).text()
     prefix = "s" + hashlib.sha256(inner.encode()).hexdigest()[:5]
     head, rest = inner.replace(PREFIX, prefix).split(">", 1)
-    return f"{head}>\n<title>{escape(title)}</title>{rest}\n"
+    return f"{head}>\n<title>{escape(title)}</title><!-- {MARK} -->{rest}\n"
 
 
 class _Writer:

@@ -1,0 +1,119 @@
+"""What a run says while it works: lines, a bar on a terminal, how long each phase took; and how it is stopped."""
+
+from __future__ import annotations
+
+import math
+import signal
+import sys
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass, field
+from types import FrameType
+from typing import TYPE_CHECKING, Any
+
+from .deferred import deferred
+from .files import one_line
+from .running import Running
+
+if TYPE_CHECKING:
+    from .fit.loop import Progress
+
+Console = deferred("rich.console", "Console")
+Bar, BarColumn = deferred("rich.progress", "Progress"), deferred("rich.progress", "BarColumn")
+TextColumn = deferred("rich.progress", "TextColumn")
+TimeRemainingColumn = deferred("rich.progress", "TimeRemainingColumn")
+
+
+@dataclass
+class Teller:
+    """Says what happens: lines on standard output (on stderr where that carries an export), a bar on a terminal."""
+
+    running: Running
+    to_stderr: bool = False
+    bar: Any = None
+    task: Any = None
+    seconds: dict[str, float] = field(default_factory=dict)  # of each phase
+
+    def say(self, line: str) -> None:
+        """Prints a line, unless the run is quiet."""
+        if self.running.quiet:
+            return
+        with self._without_bar():
+            print(one_line(line), file=sys.stderr if self.to_stderr else sys.stdout, flush=True)
+
+    @contextmanager
+    def _without_bar(self) -> Iterator[None]:
+        if self.bar:
+            self.bar.stop()
+        yield
+        if self.bar:
+            self.bar.start()
+
+    def about_phases(self) -> str:
+        """How long each phase took, the longest first."""
+        found = sorted(self.seconds.items(), key=lambda item: -item[1])
+        return ", ".join(f"{name} {seconds:.1f} s" for name, seconds in found if seconds >= 0.05)
+
+    @contextmanager
+    def phase(self, name: str) -> Iterator[None]:
+        """A part of the work that has a name on the bar, and whose time is taken."""
+        started = time.perf_counter()
+        if self.bar:
+            self.bar.update(self.task, description=name, total=None, completed=0, detail="")
+        try:
+            yield
+        finally:
+            self.seconds[name] = self.seconds.get(name, 0.0) + time.perf_counter() - started
+
+    def step(self, progress: Progress) -> None:
+        """Shows where a fit stands."""
+        if not self.bar:
+            return
+        counted = f"step {progress.step}/{progress.steps}"
+        loss = f"  loss {progress.loss:.5f}" if math.isfinite(progress.loss) else ""
+        self.bar.update(
+            self.task,
+            description=f"{progress.phase} on {progress.device}",
+            completed=progress.step,
+            total=progress.steps if loss else None,
+            detail=counted + loss if loss else "",
+        )
+
+
+@contextmanager
+def telling(running: Running, to_stderr: bool = False) -> Iterator[Teller]:
+    """A teller whose bar is there for so long."""
+    if running.quiet or not sys.stderr.isatty():
+        yield Teller(running, to_stderr)
+        return
+    columns = (
+        TextColumn("{task.description:>7}"),
+        BarColumn(),
+        TextColumn("{task.fields[detail]}"),
+        TimeRemainingColumn(),
+    )
+    with Bar(*columns, console=Console(stderr=True), transient=True, redirect_stdout=False) as bar:
+        yield Teller(running, to_stderr, bar, bar.add_task("start", total=None, detail=""))
+
+
+class Stop:
+    """Set by the first Ctrl-C; the second one interrupts as usual."""
+
+    requested = False
+
+
+@contextmanager
+def stopping() -> Iterator[Stop]:
+    """The first Ctrl-C within asks for an end."""
+    stop = Stop()
+
+    def request(number: int, frame: FrameType | None) -> None:
+        stop.requested = True
+        signal.signal(signal.SIGINT, signal.default_int_handler)
+
+    before = signal.signal(signal.SIGINT, request)
+    try:
+        yield stop
+    finally:
+        signal.signal(signal.SIGINT, before)
