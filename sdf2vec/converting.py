@@ -7,6 +7,7 @@ import sys
 import time
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from pathlib import Path
 from typing import TYPE_CHECKING, Any, BinaryIO
 
 from msgspec.structs import replace
@@ -18,7 +19,7 @@ from .export import EXPORTERS
 from .export.exported import Exported
 from .export.options import Options
 from .exports import Exports
-from .files import one_line, write_atomically
+from .files import one_line, shown_as, write_atomically
 from .outputs import STREAM, Job, beside_of, stem_of
 from .progress import Stop, Teller
 from .running import Running
@@ -77,7 +78,7 @@ def convert(job: Job, work: Work, teller: Teller, stop: Stop) -> Done:
     teller.say(
         f"{_name(job.source)}: {size}, {scene.shape_count} shapes, {near}, fitted in {seconds:.1f} s{early}"
     )
-    original = encode_png(picture.pixels) if work.running.with_original else None
+    original = _original(job.source, picture) if work.running.with_original else None
     written = write_exports(scene, job, replace(work.export, original=original), teller)
     seconds = time.perf_counter() - started
     teller.say(f"  {seconds:.1f} s in all{_phases(teller)}")
@@ -112,6 +113,12 @@ def _read_picture(source: str) -> Picture:
             shown = one_line(source)
             raise Sdf2vecError(f"{shown}: is a scene, not a picture; sdf2vec export {shown}") from None
         raise
+
+
+def _original(source: str, picture: Picture) -> bytes:
+    """The file's own bytes where a browser shows what was read of it, else a PNG of that."""
+    data = b"" if source == STREAM else Path(source).read_bytes()
+    return data if shown_as(data) else encode_png(picture.pixels)
 
 
 def _is_scene(path: str) -> bool:

@@ -74,6 +74,15 @@ def _temporary_name() -> str:
     return f".sdf2vec-{secrets.token_hex(8)}.tmp"
 
 
+def shown_as(data: bytes) -> str:
+    """What a browser shows a still picture's file as: png, jpeg, webp. Nothing for any other, and for a moving one."""
+    if data.startswith(b"\x89PNG"):
+        return "" if b"acTL" in data[:4096] else "png"
+    if data[:4] == b"RIFF" and data[8:12] == b"WEBP":
+        return "" if b"ANIM" in data[:64] else "webp"
+    return "jpeg" if data.startswith(b"\xff\xd8\xff") else ""
+
+
 def one_line(text: str) -> str:
     """`text` fit for one line of a message: control characters and undecodable bytes as escapes."""
     return "".join(c if c.isprintable() else c.encode("unicode_escape").decode() for c in text) or "''"

@@ -9,6 +9,7 @@ from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from functools import cache, partial
 from typing import Any
+from urllib.parse import unquote_to_bytes
 
 import numpy as np
 import torch
@@ -222,8 +223,9 @@ def _element(trip: RoundTrip, made: Exported, scene: Scene, width: int, height: 
 
 def _decoded(trip: RoundTrip, made: Exported, scene: Scene, width: int, height: int) -> Pixels:
     """The drawing that an address holds."""
-    text = base64.b64decode(str(made.data).partition(",")[2]).decode()
-    return premultiply(trip.drawn(text, width, height))
+    head, _, rest = str(made.data).partition(",")
+    text = base64.b64decode(rest) if head.endswith(";base64") else unquote_to_bytes(rest)
+    return premultiply(trip.drawn(text.decode(), width, height))
 
 
 def _svg(target: str, profile: str, *engines: str) -> tuple[RoundTrip, ...]:

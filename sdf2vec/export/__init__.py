@@ -52,7 +52,7 @@ def _shader(
 
 
 def _svg(name: str, suffix: str, about: str, endings: tuple[str, ...] = ()) -> Exporter:
-    module, heeds = "sdf2vec.export.svg", ("svg_profile", "svg_size_limit", "title")
+    module, heeds = "sdf2vec.export.svg", ("svg_profile", "svg_size_limit", "title", "alt")
     accepts = deferred(module, "accepts")
     return Exporter(suffix, deferred(module, name), about, accepts, heeds, endings)
 
@@ -98,7 +98,7 @@ EXPORTERS: dict[str, Exporter] = {
         ".html",
         deferred("sdf2vec.export.page", "html"),
         "one page without dependencies: shader, drawing, copy buttons",
-        heeds=("title", "original"),
+        heeds=("title", "alt", "original"),
         other_endings=(".htm",),
         mark=b'<meta name="generator" content="sdf2vec">',
     ),

@@ -34,9 +34,10 @@ class Options(Struct, frozen=True, kw_only=True):
         str, choice("SVG profile", "with blur filters, or without, for every renderer", SVG_PROFILES)
     ] = SVG_PROFILES[0]
     svg_size_limit: SizeLimit | None = None
-    title: Annotated[str, plain("what an export calls the picture")] = "a picture"
+    title: Annotated[str, plain("what an export calls the picture (default: its name)", "TEXT")] = "a picture"
+    alt: Annotated[str, plain("what is in the picture, for who can't see an SVG or a page", "TEXT")] = ""
     alone: Annotated[bool, plain("no files beside the text")] = False
-    original: Annotated[bytes | None, plain("PNG or JPEG that a page compares with")] = None
+    original: Annotated[bytes | None, plain("PNG, JPEG or WebP that a page compares with")] = None
 
 
 @dataclass(frozen=True)

@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import base64
 import json
+from html import escape
 
 import numpy as np
 from msgspec.structs import replace
 
 from ..errors import Sdf2vecError
-from ..files import one_line
+from ..files import one_line, shown_as
 from ..scene import Scene
 from ..templating import template
 from .exported import Exported
@@ -23,7 +24,7 @@ LABELS = {"shadertoy": "Shadertoy", "glsl": "GLSL", "wgsl": "WGSL", "svg": "SVG"
 
 def html(scene: Scene, options: Options) -> Exported:
     """A page that needs no network, with buttons that copy the scene in other forms."""
-    plain = Options(title=options.title)
+    plain = Options(title=options.title, alt=options.alt)
     made = shader(scene, "glsl", replace(plain, layout="data"))
     alone = replace(plain, alone=True)
     texts = {name: shader(scene, name, alone).text for name in ("shadertoy", "glsl", "wgsl")}
@@ -31,6 +32,7 @@ def html(scene: Scene, options: Options) -> Exported:
     text = template("page.html.jinja").render(
         scene=scene,
         title=one_line(options.title),
+        alt=one_line(options.alt or options.title),
         fallback=drawing or _image(scene, plain),
         original=_data_url(options.original) if options.original else "",
         labels={name: label for name, label in LABELS.items() if name != "svg" or drawing},
@@ -56,9 +58,9 @@ def _floats(made: Shader) -> bytes:
 
 
 def _image(scene: Scene, options: Options) -> str:
-    return f'<img src="{_data_url(png(scene, options).raw)}" alt="">'
+    told = escape(one_line(options.alt or options.title))
+    return f'<img src="{_data_url(png(scene, options).raw)}" alt="{told}">'
 
 
 def _data_url(data: bytes) -> str:
-    kind = "png" if data.startswith(b"\x89PNG") else "jpeg"
-    return f"data:image/{kind};base64,{base64.b64encode(data).decode()}"
+    return f"data:image/{shown_as(data)};base64,{base64.b64encode(data).decode()}"

@@ -1,9 +1,11 @@
 """The command line: what it writes where, and what it says."""
 
+import base64
 import io
 import json
 import os
 import re
+import time
 from xml.etree import ElementTree
 
 import numpy as np
@@ -13,6 +15,7 @@ from PIL import Image
 import sdf2vec
 from sdf2vec import quality
 from sdf2vec.fit import loop
+from sdf2vec.roundtrip import Check
 from tests.cli.command import ALL, OUTPUTS, SHORT, as_png, names, picture
 
 
@@ -113,9 +116,67 @@ def test_the_options_of_a_fit(folder, run, monkeypatch):
 
 
 def test_quiet(folder, run):
-    outcome = run("photo.jpg", *SHORT, "--quiet")
-    assert outcome == (0, b"", "")
+    for flag, command in (("--quiet", ()), ("-q", ("--emit", "json"))):
+        assert run("photo.jpg", *SHORT, flag, *command) == (0, b"", "")
     assert (folder / "photo.glsl").exists()
+    assert run("export", "photo.scene.json", "-q", "-o", "a.glsl") == (0, b"", "")
+    assert run("render", "photo.scene.json", "-q", "-o", "a.png") == (0, b"", "")
+    assert {"a.glsl", "a.png"} <= set(names(folder))
+
+
+def test_the_summary_ends_with_all_the_seconds(folder, run, monkeypatch):
+    """Of the fit, the exports and the checks; `-v` says for what."""
+    monkeypatch.setattr("sdf2vec.converting.figure", lambda *_: time.sleep(0.4))
+    began = time.perf_counter()
+    lines = run("photo.jpg", *SHORT, "--emit", "svg", "-v").out.decode().splitlines()
+    took = time.perf_counter() - began
+    total = re.fullmatch(r"  (\d+\.\d) s in all: .*\bcheck svg 0\.[4-9] s.*", lines[-1])
+    assert total
+    fitted = re.search(r"fitted in (\d+\.\d) s", lines[0])
+    assert fitted
+    assert float(fitted[1]) + 0.3 < float(total[1]) <= took + 0.1
+    lines = run("photo.jpg", *SHORT, "--emit", "svg").out.decode().splitlines()
+    assert re.fullmatch(r"  \d+\.\d s in all", lines[-1])
+    monkeypatch.setattr("sdf2vec.converting.figure", lambda *_: pytest.fail("checked"))
+    assert run("photo.jpg", *SHORT, "--emit", "svg", "--check", "off").code == 0
+
+
+@pytest.mark.parametrize(("error", "shown"), [(261.4, "261"), (9.96, "10"), (1.24, "1.2"), (0.0312, "0.031")])
+def test_errors_are_plain_numbers(folder, run, monkeypatch, error, shown):
+    worst = Check("svg", "resvg", 24, 16, 40.0, error, 0.0)
+    monkeypatch.setattr("sdf2vec.converting.figure", lambda *_: worst)
+    out = run("photo.jpg", *SHORT, "--emit", "svg").out.decode()
+    assert f"resvg draws it at 40.0 dB, largest error {shown} levels" in out
+
+
+@pytest.mark.parametrize("name", ["photo.jpg", "photo.webp", "photo.png", "photo.bmp", "moving.webp"])
+def test_a_page_holds_the_picture_as_it_was_given(folder, run, name):
+    """Where browsers show it, and still; else as PNG."""
+    more = {"save_all": True, "append_images": [picture(seed=9)]} if name == "moving.webp" else {}
+    picture().save(folder / name, **more)
+    assert run(name, *SHORT, "--with-original", "-o", "page.html").code == 0
+    found = re.search(
+        r'class="original" src="data:image/(\w+);base64,([^"]+)"', (folder / "page.html").read_text()
+    )
+    assert found
+    held = base64.b64decode(found[2])
+    with Image.open(io.BytesIO(held)) as image:
+        assert str(image.format).lower() == found[1]
+    kept = name in ("photo.jpg", "photo.webp", "photo.png")
+    assert (held == (folder / name).read_bytes()) == kept
+    assert kept or found[1] == "png"
+
+
+def test_a_title_and_a_description(folder, run):
+    assert (
+        run("photo.jpg", *SHORT, "--title", "My <cat>", "--alt", "asleep", "-o", "a.svg", "-o", "a.html").code
+        == 0
+    )
+    root = ElementTree.parse(folder / "a.svg").getroot()
+    assert [root.findtext(f"{{*}}{name}") for name in ("title", "desc")] == ["My <cat>", "asleep"]
+    page = (folder / "a.html").read_text()
+    assert "<title>My &lt;cat&gt;</title>" in page
+    assert 'aria-label="asleep"' in page
 
 
 def test_output_is_a_file_for_one_target(folder, run):

@@ -60,6 +60,7 @@ from tests.cli.command import SHORT, as_png, assert_refused, names, picture
         (["photo.jpg", "--size", "1e3", "--emit", "png"], ["--size"]),
         (["photo.jpg", "--no-such-option"], ["--no-such-option"]),
         (["missing.png"], ["missing.png", "no such file"]),
+        (["good.scene.json"], ["is a scene, not a picture; sdf2vec export good.scene.json"]),
         (["two\nlines.png"], ["no such file"]),
         (["."], ["folder"]),
         (["text.png"], ["text.png", "not a picture"]),

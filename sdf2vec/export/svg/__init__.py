@@ -6,6 +6,7 @@ import base64
 import re
 from collections.abc import Callable
 from dataclasses import replace
+from urllib.parse import quote
 
 from ...deferred import deferred
 from ...errors import Sdf2vecError
@@ -18,6 +19,7 @@ from .plan import DETAILS, Detail, Planner
 from .writer import MARGINS, Style, written
 
 PORTABLE = "portable"
+IN_QUOTES = "!$'()*+,;=:@/?"  # what a URI takes as it is, but for "&", which HTML does not
 ACCEPTED = ("over",)
 CREATED = re.compile(rb"(/CreationDate \(D:)([^)]*)")
 PRODUCER = re.compile(rb"(?<=/Producer \()(cairo [\d.]+) \(https?://cairographics\.org\)(?=\))")
@@ -62,9 +64,16 @@ def smallest(scene: Scene, options: Options) -> str:
 
 
 def data_uri(scene: Scene, options: Options) -> Exported:
-    """The SVG as a data URI, for `src` and `url()`; base64, which every parser takes."""
+    """The SVG as a data URI, for `src="…"` and `url("…")`: URL-encoded, or in base64 where that is smaller."""
     made = svg(scene, options)
-    return replace(made, data="data:image/svg+xml;base64," + base64.b64encode(made.raw).decode())
+    encoded = "data:image/svg+xml;base64," + base64.b64encode(made.raw).decode()
+    return replace(made, data=min(f"data:image/svg+xml,{_quoted(str(made.data))}", encoded, key=len))
+
+
+def _quoted(text: str) -> str:
+    """An SVG text as part of a URI, in as few characters as stand between double quotes."""
+    text = text.strip().replace(">\n<", "><").replace("'", "&#39;").replace('"', "'")
+    return quote(text, safe=IN_QUOTES)
 
 
 def pdf(scene: Scene, options: Options) -> Exported:
@@ -90,7 +99,7 @@ def _text(planner: Planner, detail: Detail, options: Options) -> str:
     grain = detail.grain
     style = Style(detail.named, grain is not None, grain.margins if grain else MARGINS)
     drawn = drawing(planner.scene, planner.plan(detail), detail)
-    return written(drawn, one_line(options.title), style)
+    return written(drawn, one_line(options.title), style, one_line(options.alt) if options.alt else "")
 
 
 def _coarser(detail: Detail, limit: int) -> str:
