@@ -50,7 +50,7 @@ def render(scene: Scene, width: int | None = None, height: int | None = None) ->
 
 
 def export(scene: Scene, target: str, **options: Any) -> str | bytes:
-    """The scene in a target format, a key of `sdf2vec.export.EXPORTERS`: text, or bytes for "pdf" and rendered pictures.
+    """The scene in a target format, a key of `sdf2vec.export.EXPORTERS`: text, or bytes for "pdf" and pictures.
 
     Options: those of `exported`. Raises Sdf2vecError.
     """

@@ -3,24 +3,23 @@
 import io
 import math
 import re
+import sys
 
 import pytest
-from rich.console import Console
 
-from sdf2vec import progress
 from sdf2vec.fit.loop import Progress
 from sdf2vec.progress import telling
 from sdf2vec.running import Running
 
 
 @pytest.fixture
-def terminal(monkeypatch, capsys):
+def terminal(monkeypatch):
     """What a terminal shows."""
     stream = io.StringIO()
-    monkeypatch.setattr("sys.stderr.isatty", lambda: True, raising=False)
-    monkeypatch.setattr(
-        progress, "Console", lambda stderr: Console(file=stream, force_terminal=True, width=100)
-    )
+    stream.isatty = lambda: True  # type: ignore[method-assign]
+    monkeypatch.setattr(sys, "stderr", stream)
+    monkeypatch.setenv("TERM", "xterm")
+    monkeypatch.setenv("COLUMNS", "100")
     return stream
 
 

@@ -4,6 +4,7 @@ import base64
 import math
 import re
 from dataclasses import replace
+from urllib.parse import unquote
 from urllib.request import urlopen
 from xml.etree import ElementTree
 
@@ -12,7 +13,7 @@ import pytest
 
 from sdf2vec import Layer, Scene, Sdf2vecError, Shape
 from sdf2vec.export.options import Options
-from sdf2vec.export.svg import accepts, data_uri, pdf
+from sdf2vec.export.svg import _quoted, accepts, data_uri, pdf
 from sdf2vec.export.svg import svg as write_svg
 from tests.export.svg.drawings import (
     NAMESPACE,
@@ -137,6 +138,10 @@ def test_a_data_uri_holds_the_svg(title):
     assert address == encoded if len(title) > 1000 else len(address) < 0.96 * len(encoded)
     assert re.fullmatch(r"[!#$'()*+,\-./0-9:;=?@A-Z_a-z~%]+", address)
     assert "#" not in address
+
+
+def test_quotes_in_attributes_of_a_data_uri_survive():
+    assert ElementTree.fromstring(unquote(_quoted('<a b="it\'s"/>'))).get("b") == "it's"
 
 
 def test_what_is_in_the_picture_is_said():
