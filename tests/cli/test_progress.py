@@ -5,16 +5,13 @@ import math
 import re
 import sys
 
-import pytest
-
 from sdf2vec.fit.loop import Progress
 from sdf2vec.progress import telling
 from sdf2vec.running import Running
 
 
-@pytest.fixture
 def terminal(monkeypatch):
-    """What a terminal shows."""
+    """Makes stderr a terminal, from now on; what it shows."""
     stream = io.StringIO()
     stream.isatty = lambda: True  # type: ignore[method-assign]
     monkeypatch.setattr(sys, "stderr", stream)
@@ -23,7 +20,8 @@ def terminal(monkeypatch):
     return stream
 
 
-def test_the_bar_names_every_phase_and_never_a_number_that_is_none(terminal, capsys):
+def test_the_bar_names_every_phase_and_never_a_number_that_is_none(monkeypatch, capsys):
+    stream = terminal(monkeypatch)
     with telling(Running()) as teller:
         with teller.phase("fit"):
             teller.step(Progress("compiling kernels (once)", 0, 90, math.nan))
@@ -34,7 +32,7 @@ def test_the_bar_names_every_phase_and_never_a_number_that_is_none(terminal, cap
             with teller.phase(name):
                 teller.bar.refresh()
             teller.say(f"done: {name}")
-    shown = re.sub(r"\x1b\[[0-9;?]*[A-Za-z]", "", terminal.getvalue())
+    shown = re.sub(r"\x1b\[[0-9;?]*[A-Za-z]", "", stream.getvalue())
     assert re.search(r"coarse on cpu .*step 7/90  loss 0\.25000", shown)
     for word in ("compiling kernels (once) on cpu", "export svg", "check svg"):
         assert word in shown
@@ -43,8 +41,9 @@ def test_the_bar_names_every_phase_and_never_a_number_that_is_none(terminal, cap
     assert set(teller.seconds) == {"fit", "export svg", "check svg"}
 
 
-def test_a_quiet_run_has_no_bar(terminal, capsys):
+def test_a_quiet_run_has_no_bar(monkeypatch, capsys):
+    stream = terminal(monkeypatch)
     with telling(Running(quiet=True)) as teller, teller.phase("fit"):
         teller.say("nothing")
         teller.step(Progress("coarse", 7, 90, 0.25))
-    assert terminal.getvalue() + capsys.readouterr().out == ""
+    assert stream.getvalue() + capsys.readouterr().out == ""
