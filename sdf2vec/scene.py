@@ -29,7 +29,9 @@ from .units import BACKGROUND, COLOR, Parameter
 MAX_SHAPES = 65536
 MAX_JOINED = 128  # shapes in one layer: each is a term of one formula
 
-Side = Annotated[int, Meta(ge=1, le=65536)]  # pixels
+MOST_PIXELS = 65536  # along a side of a canvas
+
+Side = Annotated[int, Meta(ge=1, le=MOST_PIXELS)]
 Joined = Annotated[list[Any], Meta(min_length=1, max_length=MAX_JOINED)]
 Color = tuple[float, float, float]
 Value = float | tuple[float, ...]  # of a parameter
