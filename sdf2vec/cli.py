@@ -11,7 +11,8 @@ from typing import TYPE_CHECKING, Literal, NoReturn
 from msgspec.structs import replace
 
 from . import __version__, api
-from .converting import Work, convert, standard_input, write_exports
+from .batch import Batch, about, about_left, run_batch, sources_of
+from .converting import Work, standard_input, write_exports
 from .declared import add_flags, checked, chosen, options_of
 from .deferred import deferred
 from .errors import Sdf2vecError
@@ -21,7 +22,8 @@ from .exports import Exports
 from .files import one_line
 from .fit.settings import Settings, settings_of
 from .outputs import STREAM, Places, places_of, plan
-from .progress import stopping, telling
+from .progress import Teller, stopping, telling
+from .report import Report
 from .running import Running
 from .scene import Scene
 from .scene_file import load as load_scene
@@ -34,12 +36,13 @@ Console, Table = deferred("rich.console", "Console"), deferred("rich.table", "Ta
 escape: Callable[[str], str] = deferred("rich.markup", "escape")
 
 SET_HERE = ("alone", "original")  # options of exports that have no flag
+OF_FITS = ("with_original", "recursive", "skip_existing", "jobs", "report")  # what only fits heed of a run
 PICTURES = ("png", "jpg", "webp")
-OK, FAILED, INTERRUPTED = 0, 2, 130
+OK, FAILED, PARTLY, INTERRUPTED = 0, 2, 3, 130
 
 
 def main(argv: Sequence[str] | None = None) -> NoReturn:
-    """Entry point: exits with 0, with 2 after one line on stderr, or with 130 when interrupted twice."""
+    """Entry point: exits with 0; 2 after one line on stderr; 3 where some pictures failed; 130 when interrupted."""
     arguments = list(sys.argv[1:] if argv is None else argv)
     run = COMMANDS.get(arguments[0]) if arguments else None
     try:
@@ -81,7 +84,12 @@ def _convert_parser() -> argparse.ArgumentParser:
         epilog="Other commands, each with its own --help: sdf2vec check | render | export",
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
-    parser.add_argument("inputs", nargs="+", metavar="INPUT", help="pictures; - reads standard input")
+    parser.add_argument(
+        "inputs",
+        nargs="+",
+        metavar="INPUT",
+        help="pictures, folders of pictures, patterns; - reads standard input",
+    )
     _add_emit(parser, "glsl")
     _add_output(parser)
     add_flags(parser.add_argument_group("run"), Running)
@@ -135,28 +143,23 @@ def _convert(arguments: list[str]) -> int:
     places = places_of(options.emit, options.output, "glsl")
     given, running = chosen(options, Settings), checked(Running, chosen(options, Running))
     also_read = [given[name] for name in ("start", "weights") if name in given]
-    jobs = plan(_sources(options.inputs), places, also_read, running.force)
+    jobs = plan(sources_of(options.inputs, running.recursive), places, also_read, running.force)
     work = Work(given, _export_options(options, places.targets), running)
     _check_settings(work, places.targets)
-    status = OK
-    for job in jobs:
+    batch = Batch(jobs, work, Report(running.report, running.force))
+    with stopping() as stop:
         try:
-            with telling(running, STREAM in job.outputs.values()) as teller, stopping() as stop:
-                done = convert(job, work, teller, stop)
-        except Sdf2vecError as error:
-            _complain(str(error))
-            status = FAILED
-            continue
-        if done.stopped:
-            return INTERRUPTED
-    return status
-
-
-def _sources(inputs: Sequence[str]) -> dict[str, str]:
-    twice = next((source for source in inputs if inputs.count(source) > 1), None)
-    if twice is not None:
-        raise Sdf2vecError(f"{twice}: is given twice")
-    return dict.fromkeys(inputs, "")
+            run_batch(batch, stop)
+        finally:
+            left = about_left(batch)
+            if left and len(jobs) > 1:
+                _complain(left)
+    if len(jobs) > 1:
+        Teller(running, to_stderr=any(STREAM in job.outputs.values() for job in jobs)).say(about(batch))
+    if stop.requested:
+        return INTERRUPTED
+    failed = batch.count("failed")
+    return OK if not failed else FAILED if failed == len(jobs) else PARTLY
 
 
 def _check_settings(work: Work, targets: Sequence[str]) -> None:
@@ -184,7 +187,7 @@ def _render_command(arguments: list[str]) -> int:
     parser = _scene_parser("render", "Renders a scene file as PNG, JPEG or WebP.")
     _add_output(parser)
     options_of(Options)["size"].add_flag(parser)
-    add_flags(parser, Running, ("with_original", "check"))
+    add_flags(parser, Running, (*OF_FITS, "check"))
     options = parser.parse_args(arguments)
     return _write_scene_exports(options, places_of(None, options.output, "png", PICTURES))
 
@@ -193,7 +196,7 @@ def _export_command(arguments: list[str]) -> int:
     parser = _scene_parser("export", "Exports a scene file, without fitting anew.")
     _add_emit(parser, "glsl")
     _add_output(parser)
-    add_flags(parser.add_argument_group("run"), Running, ("with_original",))
+    add_flags(parser.add_argument_group("run"), Running, OF_FITS)
     add_flags(parser.add_argument_group("export"), Options, SET_HERE)
     options = parser.parse_args(arguments)
     return _write_scene_exports(options, places_of(options.emit, options.output, "glsl"))

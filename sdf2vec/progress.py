@@ -34,10 +34,15 @@ class Teller:
     bar: Any = None
     task: Any = None
     seconds: dict[str, float] = field(default_factory=dict)  # of each phase
+    which: str = ""  # of many pictures: "3/40 "
+    lines: list[str] | None = None  # where they are kept to be said later
 
     def say(self, line: str) -> None:
         """Prints a line, unless the run is quiet."""
         if self.running.quiet:
+            return
+        if self.lines is not None:
+            self.lines.append(line)
             return
         with self._without_bar():
             print(one_line(line), file=sys.stderr if self.to_stderr else sys.stdout, flush=True)
@@ -60,11 +65,22 @@ class Teller:
         """A part of the work that has a name on the bar, and whose time is taken."""
         started = time.perf_counter()
         if self.bar:
-            self.bar.update(self.task, description=name, total=None, completed=0, detail="")
+            self.bar.update(self.task, description=self.which + name, total=None, completed=0, detail="")
         try:
             yield
         finally:
             self.seconds[name] = self.seconds.get(name, 0.0) + time.perf_counter() - started
+
+    def counted(self, done: int, everything: int) -> None:
+        """Shows how many pictures are done."""
+        if self.bar:
+            self.bar.update(
+                self.task,
+                description="pictures",
+                completed=done,
+                total=everything,
+                detail=f"{done}/{everything}",
+            )
 
     def step(self, progress: Progress) -> None:
         """Shows where a fit stands."""
@@ -74,7 +90,7 @@ class Teller:
         loss = f"  loss {progress.loss:.5f}" if math.isfinite(progress.loss) else ""
         self.bar.update(
             self.task,
-            description=f"{progress.phase} on {progress.device}",
+            description=f"{self.which}{progress.phase} on {progress.device}",
             completed=progress.step,
             total=progress.steps if loss else None,
             detail=counted + loss if loss else "",
@@ -82,10 +98,10 @@ class Teller:
 
 
 @contextmanager
-def telling(running: Running, to_stderr: bool = False) -> Iterator[Teller]:
+def telling(running: Running, to_stderr: bool = False, which: str = "") -> Iterator[Teller]:
     """A teller whose bar is there for so long."""
     if running.quiet or not sys.stderr.isatty():
-        yield Teller(running, to_stderr)
+        yield Teller(running, to_stderr, which=which)
         return
     columns = (
         TextColumn("{task.description:>7}"),
@@ -94,7 +110,9 @@ def telling(running: Running, to_stderr: bool = False) -> Iterator[Teller]:
         TimeRemainingColumn(),
     )
     with Bar(*columns, console=Console(stderr=True), transient=True, redirect_stdout=False) as bar:
-        yield Teller(running, to_stderr, bar, bar.add_task("start", total=None, detail=""))
+        yield Teller(
+            running, to_stderr, bar, bar.add_task(f"{which}start", total=None, detail=""), which=which
+        )
 
 
 class Stop:

@@ -251,9 +251,10 @@ def test_a_bad_input_does_not_stop_the_others(folder, run):
     picture(seed=1).save(folder / "last.png")
     (folder / "bad.png").write_bytes(b"not a picture")
     outcome = run("photo.jpg", "bad.png", "last.png", *SHORT, "--emit", "json")
-    assert outcome.code == 2
+    assert outcome.code == 3
     assert outcome.err.count("\n") == 1
     assert outcome.err.startswith("sdf2vec: bad.png: ")
+    assert outcome.out.endswith(b"3 pictures: 2 done, 1 failed\n")
     assert names(folder) == ["bad.png", "last.png", "last.scene.json", "photo.jpg", "photo.scene.json"]
 
 
@@ -264,7 +265,7 @@ def test_names_with_strange_characters(folder, run):
         os.rename(folder / "x.png", folder / name)
     outcome = run(*strange, *SHORT, "--emit", "glsl,svg")
     assert outcome.code == 0
-    assert outcome.out.count(b"\n") == 3 * 5
+    assert outcome.out.count(b"\n") == 3 * 5 + 1
     for name in strange:
         stem = name.removesuffix(".png")
         ElementTree.parse(folder / f"{stem}.svg")

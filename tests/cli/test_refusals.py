@@ -62,7 +62,12 @@ from tests.cli.command import SHORT, as_png, assert_refused, names, picture
         (["missing.png"], ["missing.png", "no such file"]),
         (["good.scene.json"], ["is a scene, not a picture; sdf2vec export good.scene.json"]),
         (["two\nlines.png"], ["no such file"]),
-        (["."], ["folder"]),
+        (["folders"], ["folders: is a folder without pictures", ".webp", "--recursive"]),
+        (["*.gif"], ["*.gif: no such file"]),
+        (["photo.jpg", "--jobs", "0"], ["number of processes", "got 0"]),
+        (["photo.jpg", "--report", "r.txt"], ["r.txt", ".jsonl or .csv"]),
+        (["photo.jpg", "--report", "bad.csv"], ["bad.csv", "no report of sdf2vec", "--force"]),
+        (["photo.jpg", "--report", "bad.jsonl"], ["bad.jsonl", "no report of sdf2vec"]),
         (["text.png"], ["text.png", "not a picture"]),
         (["empty.png"], ["empty.png", "empty file"]),
         (["cut.png"], ["cut.png", "truncated"]),
@@ -117,6 +122,8 @@ def test_refusals_leave_nothing_behind(folder, run, arguments, words):
     Image.new("L", (5, 5)).save(folder / "black.png")
     (folder / "wide.scene.json").write_text(good.replace("24", "65000").replace("16", "65000"))
     (folder / "bad.scene.json").write_text(good.replace("0.25", "-3"))
+    for name in ("bad.csv", "bad.jsonl"):
+        (folder / name).write_text("mine,all mine\n1,2\n")
     (folder / "folders" / "photo.glsl").mkdir(parents=True)
     before = {name: (folder / name).read_bytes() for name in names(folder)}
     converts = arguments and arguments[0] not in ("render", "export", "check")
