@@ -182,8 +182,17 @@ def _framing(pick: Callable[[Expr, Expr], Expr], does: str) -> tuple[Function, F
 
 
 # How a scene meets a canvas of another shape: the point and the size of a pixel.
+CROP = "crop"  # fits, with the ground around it
 FRAMINGS = {"fit": _framing(maximum, "fits into"), "cover": _framing(minimum, "covers")}
+FRAMINGS[CROP] = FRAMINGS["fit"]
 scene_point, pixel_size = FRAMINGS["fit"]
+
+
+@function("cropped", color=VEC4, p=VEC2, size=VEC2, ground=VEC4)
+def cropped(color: Expr, p: Expr, size: Expr, ground: Expr) -> Expr:
+    """The colour at p within a scene of this size, the ground outside."""
+    beyond = let("beyond", absolute(p) - 0.5 * size)
+    return select(maximum(beyond.x, beyond.y) > 0.0, ground, color)
 
 
 @function("surfacePoint", uv=VEC2, size=VEC2)

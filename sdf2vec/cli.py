@@ -3,14 +3,17 @@
 from __future__ import annotations
 
 import argparse
+import json
 import sys
 import time
 from collections.abc import Callable, Collection, Sequence
+from dataclasses import asdict
+from math import isfinite
 from typing import TYPE_CHECKING, Literal, NoReturn
 
 from msgspec.structs import replace
 
-from . import __version__, api
+from . import __version__
 from .batch import Batch, about, about_left, run_batch, sources_of
 from .converting import Work, standard_input, write_exports
 from .declared import add_flags, checked, chosen, options_of
@@ -21,7 +24,7 @@ from .export.options import Options
 from .exports import Exports
 from .files import one_line
 from .fit.settings import Settings, settings_of
-from .outputs import STREAM, Places, places_of, plan
+from .outputs import STREAM, Places, places_of, plan, read_exports
 from .progress import Teller, stopping, telling
 from .report import Report
 from .running import Running
@@ -33,12 +36,14 @@ if TYPE_CHECKING:
     from .roundtrip import Check
 
 Console, Table = deferred("rich.console", "Console"), deferred("rich.table", "Table")
+round_trips: Callable[..., list[Check]] = deferred("sdf2vec.roundtrip", "check")
+legend: Callable[[], str] = deferred("sdf2vec.roundtrip", "legend")
 escape: Callable[[str], str] = deferred("rich.markup", "escape")
 
 SET_HERE = ("alone", "original")  # options of exports that have no flag
 OF_FITS = ("with_original", "recursive", "skip_existing", "jobs", "report")  # what only fits heed of a run
 PICTURES = ("png", "jpg", "webp")
-OK, FAILED, PARTLY, INTERRUPTED = 0, 2, 3, 130
+OK, DIFFERS, FAILED, PARTLY, INTERRUPTED = 0, 1, 2, 3, 130
 
 
 def main(argv: Sequence[str] | None = None) -> NoReturn:
@@ -221,21 +226,54 @@ def _write_scene_exports(options: argparse.Namespace, places: Places) -> int:
 
 
 def _check_command(arguments: list[str]) -> int:
-    parser = _scene_parser(
-        "check",
-        "Re-renders each export of a scene file on the engines present and compares it with the render.",
+    parser = _Parser(
+        prog="sdf2vec check",
+        usage="sdf2vec check [FILE...] SCENE [--emit TARGETS] [--json] [-q] [-v]",
+        description="Re-renders exports of a scene file on the engines present and compares them with the render: "
+        "the files given, or each target anew. Exit code 1 where one differs.",
     )
+    parser.add_argument("files", nargs="+", metavar="FILE", help="exports, and a scene file; - reads it")
     parser.add_argument("--emit", action="append", metavar="TARGETS", help="only these targets")
-    options = parser.parse_args(arguments)
+    parser.add_argument("--json", action="store_true", help="print a JSON list instead of a table")
+    add_flags(parser, Running, (*OF_FITS, "check", "force"))
+    options = parser.parse_intermixed_args(arguments)
+    running = checked(Running, chosen(options, Running))
+    scene, files = _scene_and_files(options.files)
+    if files and options.emit:
+        raise Sdf2vecError("either files to check or --emit, not both")
     targets = places_of(options.emit, None, "glsl").targets if options.emit else None
-    results = api.check(_read_scene(options.scene), targets)
-    _print_table(results)
+    with telling(running) as teller, teller.phase("check"):
+        results = round_trips(_read_scene(scene), targets, None, read_exports(files) or None, teller.name)
+    if options.json:
+        teller.say_all(_as_json(results))
+    else:
+        _print_table(results, running)
     if all(result.missing for result in results):
         raise Sdf2vecError(f"no engine could check anything: {results[0].missing}")
-    return OK if all(result.verdict != "differs" for result in results) else 1
+    if running.verbose and not options.json:
+        teller.say(f"{teller.seconds['check']:.1f} s in all")
+    return OK if all(result.verdict != "differs" for result in results) else DIFFERS
 
 
-def _print_table(results: list[Check]) -> None:
+def _scene_and_files(files: Sequence[str]) -> tuple[str, list[str]]:
+    scenes = [path for path in files if path == STREAM or path.lower().endswith(".json")]
+    scene = scenes[0] if len(scenes) == 1 else files[0] if len(files) == 1 else None
+    if scene is None:
+        raise Sdf2vecError(f"one scene file (.json) is needed, got {len(scenes)}: {', '.join(files)}")
+    return scene, [path for path in files if path != scene]
+
+
+def _as_json(results: list[Check]) -> str:
+    rows = ({**asdict(result), "verdict": result.verdict} for result in results)
+    plain = [
+        {k: v if not isinstance(v, float) or isfinite(v) else None for k, v in row.items()} for row in rows
+    ]
+    return json.dumps(plain, indent=1)
+
+
+def _print_table(results: list[Check], running: Running) -> None:
+    if running.quiet:
+        return
     table = Table(box=None, pad_edge=False)
     for name, justify in TABLE_COLUMNS.items():
         table.add_column(name, justify=justify)
@@ -249,7 +287,9 @@ def _print_table(results: list[Check]) -> None:
         row = ("", "", "", "") if r.missing else numbers
         verdict = f"{r.verdict}: {r.missing}" if r.missing else r.verdict
         table.add_row(r.target, r.engine, *row, escape(verdict))
-    Console(width=None if sys.stdout.isatty() else 200).print(table)
+    console = Console(width=None if sys.stdout.isatty() else 200)
+    console.print(table)
+    console.print(f"\n{legend()}", highlight=False)
 
 
 TABLE_COLUMNS: dict[str, Literal["left", "right"]] = {

@@ -9,6 +9,7 @@ from __future__ import annotations
 import argparse
 from collections.abc import Callable, Collection, Container, Mapping
 from dataclasses import dataclass
+from difflib import get_close_matches
 from functools import cache
 from numbers import Integral, Real
 from types import NoneType
@@ -125,7 +126,13 @@ def _plain(value: Any) -> Any:
 
 def checked(record: type[Record], given: Mapping[str, Any]) -> Record:
     """A record of the values given. Raises Sdf2vecError for the first impossible one, TypeError for an unknown name."""
-    made, options = record(**given), options_of(record)
+    options = options_of(record)
+    for name in given:
+        if name not in options:
+            near = get_close_matches(name, options, 1)
+            known = f"did you mean {near[0]!r}?" if near else f"known are {', '.join(options)}"
+            raise TypeError(f"unknown option {name!r}; {known}")
+    made = record(**given)
     return msgspec.structs.replace(made, **{n: options[n].checked(value) for n, value in given.items()})
 
 

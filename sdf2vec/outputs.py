@@ -12,9 +12,11 @@ from urllib.parse import unquote_to_bytes
 from .declared import check_choice
 from .errors import Sdf2vecError
 from .export import EXPORTERS, Exporter
+from .export.exported import Exported
 from .files import one_line, require_writable
 
 STREAM = "-"
+BINARY = ("pdf", "png", "jpg", "webp")  # targets that are no text
 LOOKED_AT = 1 << 20  # bytes at both ends of a file in which a mark is looked for
 
 
@@ -157,6 +159,25 @@ def _listed(names: Sequence[str]) -> str:
 
 def _shown(name: str) -> str:
     return one_line(name)
+
+
+def read_exports(paths: Iterable[str]) -> dict[str, Exported]:
+    """Exports that have been written, by target, with the files beside them. Raises Sdf2vecError."""
+    found: dict[str, Exported] = {}
+    for path in paths:
+        target = _target_of(path, (), EXPORTERS)
+        if target in found:
+            raise Sdf2vecError(f"{_shown(path)}: a second {target}; check them apart")
+        exporter = EXPORTERS[target]
+        beside = {ending: beside_of(path, exporter.suffix, ending) for ending in exporter.beside}
+        try:
+            data = Path(path).read_bytes()
+            there = {ending: Path(p).read_bytes() for ending, p in beside.items() if os.path.isfile(p)}
+            found[target] = Exported(data if target in BINARY else data.decode(), there)
+        except (OSError, ValueError) as error:
+            reason = getattr(error, "strerror", None) or "is no text"
+            raise Sdf2vecError(f"{_shown(path)}: cannot read it ({reason})") from None
+    return found
 
 
 # --- which files may be written -------------------------------------------------------------------------------

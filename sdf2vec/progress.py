@@ -47,6 +47,16 @@ class Teller:
         with self._without_bar():
             print(one_line(line), file=sys.stderr if self.to_stderr else sys.stdout, flush=True)
 
+    def say_all(self, text: str) -> None:
+        """Prints several lines as they are, unless the run is quiet."""
+        for line in text.splitlines():
+            self.say(line)
+
+    def name(self, name: str) -> None:
+        """Shows on the bar what is being done."""
+        if self.bar:
+            self.bar.update(self.task, description=self.which + name, total=None, completed=0, detail="")
+
     @contextmanager
     def _without_bar(self) -> Iterator[None]:
         if self.bar:
@@ -64,8 +74,7 @@ class Teller:
     def phase(self, name: str) -> Iterator[None]:
         """A part of the work that has a name on the bar, and whose time is taken."""
         started = time.perf_counter()
-        if self.bar:
-            self.bar.update(self.task, description=self.which + name, total=None, completed=0, detail="")
+        self.name(name)
         try:
             yield
         finally:

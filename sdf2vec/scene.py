@@ -9,7 +9,7 @@ from __future__ import annotations
 import math
 import re
 import reprlib
-from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import lru_cache
@@ -159,6 +159,10 @@ def named(parameters: Iterable[Parameter], row: Iterable[float]) -> dict[str, Va
     """Values by name from the numbers that come next in a row."""
     rest = iter(row)
     return {p.name: p.values_from([next(rest) for _ in range(p.width)]) for p in parameters}
+
+
+# What a notebook can show of a scene, by media type: `api` says it, since a scene knows nothing of rendering.
+SHOWN: dict[str, Callable[[Scene], str]] = {}
 
 
 # --- the scene ---------------------------------------------------------------------------------------------
@@ -352,6 +356,21 @@ class Scene:
         if not COMPOSITING[self.compositing].signed:
             for index, layer in enumerate(self.layers):
                 _refuse_signs(layer, f"layers[{index}]")
+
+    def __repr__(self) -> str:
+        kinds = dict.fromkeys(shape.kind for layer in self.layers for shape in layer.shapes)
+        told = f"{self.shape_count} shapes in {len(self.layers)} layers" + (
+            f": {', '.join(kinds)}" if kinds else ""
+        )
+        ground = "" if self.background else ", transparent"
+        return f"<Scene {self.width} × {self.height}, {told}; {self.compositing}{ground}>"
+
+    def _repr_mimebundle_(
+        self, include: Collection[str] | None = None, exclude: Collection[str] | None = None
+    ) -> dict[str, str]:
+        """What a notebook shows: the first of `SHOWN`, which is quick, unless others are asked for."""
+        asked = list(SHOWN)[:1] if include is None else [kind for kind in SHOWN if kind in include]
+        return {kind: SHOWN[kind](self) for kind in asked if kind not in (exclude or ())}
 
     @property
     def shape_count(self) -> int:

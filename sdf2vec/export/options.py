@@ -28,7 +28,17 @@ class Options(Struct, frozen=True, kw_only=True):
     size: Size | None = None
     glsl: Annotated[str, choice("GLSL version", "version of the GLSL", GLSL_VERSIONS)] = "es300"
     layout: Annotated[str, choice("layout", "how shaders hold shapes", LAYOUTS)] = "auto"
-    framing: Annotated[str, choice("framing", "how shaders fill a canvas of another shape", FRAMINGS)] = "fit"
+    framing: (
+        Annotated[
+            str,
+            choice(
+                "framing",
+                "how shaders fill a canvas of another shape: crop for pasted ones, else fit",
+                FRAMINGS,
+            ),
+        ]
+        | None
+    ) = None
     animate: Annotated[bool, plain("the shapes of a Shadertoy breathe")] = False
     svg_profile: Annotated[
         str, choice("SVG profile", "with blur filters, or without, for every renderer", SVG_PROFILES)

@@ -5,18 +5,19 @@ from __future__ import annotations
 import base64
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from typing import Any
 
 import numpy as np
 
 from ..arrays import Float32Array, IntArray
-from ..blend import BREATH, COMPOSITING, FRAMINGS, breath, display, grid_point, surface_point
+from ..blend import BREATH, COMPOSITING, CROP, FRAMINGS, breath, cropped, display, grid_point, surface_point
 from ..deferred import deferred
 from ..errors import Sdf2vecError
 from ..expr import Expr, const, var, vec2, vec4
 from ..layer import STILL, Formula, P, constant_row
 from ..lower.shader import GLSL, WGSL, Dialect, definition, expression, literal, statements, used_functions
-from ..operation import VEC2
+from ..operation import VEC2, VEC4
 from ..paints import FLAT
 from ..scene import Layer, Scene
 from ..templating import template
@@ -38,6 +39,7 @@ from .records import BELOW, COUNT, JOIN, OWN, Form, first_records, form_of, reco
 from .tiles import COARSEST, Tiles
 
 packed_text: Callable[..., Any] = deferred("sdf2vec.export.packed_text", "PackedText")  # needs torch
+CROPPED = partial(cropped, var("color", VEC4), var("at", VEC2), var("size", VEC2))  # as templates name them
 DATA_WIDTH = 256  # texels in a row of a data texture
 
 
@@ -50,11 +52,12 @@ class Target:
     host: Host
     time: str = ""  # what holds the seconds, where shapes can move
     surface: str = ""  # what holds the place on a mesh, 0..1 with y down, where there is no canvas
+    framing: str = "fit"  # unless told
 
 
 TARGETS = {
     "glsl": Target("glsl.jinja", GLSL, FILE),
-    "shadertoy": Target("shadertoy.jinja", GLSL, PASTED, time="iTime"),
+    "shadertoy": Target("shadertoy.jinja", GLSL, PASTED, time="iTime", framing=CROP),
     "wgsl": Target("wgsl.jinja", WGSL, MODULE),
     "three": Target("three.js.jinja", GLSL, EMBEDDED, surface="place"),
     "godot": Target("godot.jinja", GLSL, OLD, surface="UV"),
@@ -107,6 +110,7 @@ def shader(scene: Scene, name: str, options: Options) -> Shader:
         version=GLSL_VERSIONS[options.glsl],
         output="gl_FragColor" if options.glsl == "es100" else "fragColor",
         display="" if job.is_displayable else "display",
+        cropped=job.say(CROPPED(_background(scene))) if job.framing == CROP else "",
         place=expression(surface_point(var(target.surface, VEC2), _size(scene)), target.dialect),
         **(dict.fromkeys(("table", "packed", "tiles", "data")) | {"layers": []} | parts),
     )
@@ -190,8 +194,14 @@ class _Job:
         """From a pixel, or a place on a surface, to a point."""
         if self.target.surface:
             return [surface_point(P, P)]
-        place, pixel_size = FRAMINGS[self.options.framing]
-        return [place(P, P, P), pixel_size(P, P)]
+        place, pixel_size = FRAMINGS[self.framing]
+        around = [CROPPED(BELOW)] if self.framing == CROP else []
+        return [place(P, P, P), pixel_size(P, P), *around]
+
+    @property
+    def framing(self) -> str:
+        """How it fills a canvas of another shape."""
+        return self.options.framing or self.target.framing
 
 
 def _size(scene: Scene) -> Expr:
