@@ -26,7 +26,8 @@ def text_of(scene: Scene, target: str, **options: str) -> str:
 
 
 def assert_same(scene, target, sizes=SIZES, largest=LARGEST, **options):
-    made = sdf2vec.exported(scene, target, **options)
+    framing = {"framing": "fit"} if target in ("glsl", "shadertoy", "wgsl") else {}
+    made = sdf2vec.exported(scene, target, **framing, **options)
     for size in sizes:
         result = compare(ROUND_TRIPS[target][0], made, scene, size)
         assert result.largest_error <= largest, (target, size, result)
