@@ -188,11 +188,10 @@ FRAMINGS[CROP] = FRAMINGS["fit"]
 scene_point, pixel_size = FRAMINGS["fit"]
 
 
-@function("cropped", color=VEC4, p=VEC2, size=VEC2, ground=VEC4)
 def cropped(color: Expr, p: Expr, size: Expr, ground: Expr) -> Expr:
     """The colour at p within a scene of this size, the ground outside."""
-    beyond = let("beyond", absolute(p) - 0.5 * size)
-    return select(maximum(beyond.x, beyond.y) > 0.0, ground, color)
+    beyond = [absolute(at) - 0.5 * side for at, side in ((p.x, size.x), (p.y, size.y))]
+    return select(maximum(*beyond) > 0.0, ground, color)
 
 
 @function("surfacePoint", uv=VEC2, size=VEC2)

@@ -5,7 +5,6 @@ from __future__ import annotations
 import base64
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, replace
-from functools import partial
 from typing import Any
 
 import numpy as np
@@ -39,7 +38,7 @@ from .records import BELOW, COUNT, JOIN, OWN, Form, first_records, form_of, reco
 from .tiles import COARSEST, Tiles
 
 packed_text: Callable[..., Any] = deferred("sdf2vec.export.packed_text", "PackedText")  # needs torch
-CROPPED = partial(cropped, var("color", VEC4), var("at", VEC2), var("size", VEC2))  # as templates name them
+SEEN = var("{seen}", VEC4)  # where a template puts the colour that is seen
 DATA_WIDTH = 256  # texels in a row of a data texture
 
 
@@ -110,7 +109,7 @@ def shader(scene: Scene, name: str, options: Options) -> Shader:
         version=GLSL_VERSIONS[options.glsl],
         output="gl_FragColor" if options.glsl == "es100" else "fragColor",
         display="" if job.is_displayable else "display",
-        cropped=job.say(CROPPED(_background(scene))) if job.framing == CROP else "",
+        cropped=job.say(cropped(SEEN, P, _size(scene), _background(scene))) if job.framing == CROP else "",
         place=expression(surface_point(var(target.surface, VEC2), _size(scene)), target.dialect),
         **(dict.fromkeys(("table", "packed", "tiles", "data")) | {"layers": []} | parts),
     )
@@ -195,8 +194,7 @@ class _Job:
         if self.target.surface:
             return [surface_point(P, P)]
         place, pixel_size = FRAMINGS[self.framing]
-        around = [CROPPED(BELOW)] if self.framing == CROP else []
-        return [place(P, P, P), pixel_size(P, P), *around]
+        return [place(P, P, P), pixel_size(P, P)]
 
     @property
     def framing(self) -> str:
