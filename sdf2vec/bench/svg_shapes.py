@@ -168,7 +168,7 @@ def corners_of(element: Element) -> list[Corner]:
         kind = command.upper()
         if kind == "Z":
             continue
-        if kind not in "MLHV" or (kind == "M" and (place or len(values) > 2)):
+        if kind not in "MLHV" or (kind == "M" and place):
             return []
         width = 1 if kind in "HV" else 2
         for start in range(0, len(values), width):
