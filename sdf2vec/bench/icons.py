@@ -23,7 +23,8 @@ from ..arrays import Float32Array
 from ..engines import resvg
 from ..engines.engine import EngineError
 from ..files import write_atomically
-from ..image import Picture, encode_png, load, premultiply
+from ..image import encode_png, premultiply
+from ..scene import Scene
 from . import vtracer
 from .recovery import psnr
 from .svg_shapes import count_numbers, parsed, shapes_of
@@ -33,6 +34,8 @@ SIDE = 256  # pixels
 SHOWN = 8  # icons of the figure
 ZIPPED = 9  # gzip's level
 NEAR = 0.02  # ΔE00 that is no difference
+LIMIT = "svg_size_limit"
+GIVEN = ("kind", "preset", "max_falloff", LIMIT)  # options of the fit and of its export
 
 
 class Drawing(NamedTuple):
@@ -45,6 +48,7 @@ class Drawing(NamedTuple):
     psnr: float  # dB, premultiplied, alpha among the channels
     error: float  # mean ΔE00 over white
     seconds: float
+    parameters: int = 0  # of the scene, where there is one: numbers of its shapes but 0, no colours
 
 
 class Icon(NamedTuple):
@@ -56,7 +60,7 @@ class Icon(NamedTuple):
 
 
 def chosen(folder: Path, count: int) -> list[Path]:
-    """So many of the SVG files below a folder, evenly spaced by name, among those that resvg draws."""
+    """So many of the SVG files below a folder, evenly spaced by name."""
     paths = sorted(folder.rglob("*.svg"))
     steps = np.linspace(0, len(paths) - 1, min(count, len(paths))).round().astype(int)
     return [paths[step] for step in steps]
@@ -91,6 +95,14 @@ def elements(svg: str) -> int:
     return len(list(shapes_of(parsed(svg))))
 
 
+def parameters_of(scene: Scene) -> int:
+    """How many numbers say where a scene's shapes are, and how soft and how joined; a 0 says nothing."""
+    joined = sum(bool(joint.smoothness) for layer in scene.layers for joint in layer.joints)
+    soft = sum(bool(layer.falloff) for layer in scene.layers)
+    own = sum(bool(number) for layer in scene.layers for shape in layer.shapes for number in shape.parameters)
+    return joined + soft + own
+
+
 # --- hands --------------------------------------------------------------------------------------------------
 
 
@@ -99,9 +111,11 @@ def _fitted(
 ) -> tuple[Drawing, Float32Array]:
     """This program's."""
     started = time.process_time()
-    scene = api.fit(Picture(picture) if picture[..., 3].min() < 1 else load(picture), shapes, **options)  # type: ignore[arg-type] # "auto", where it can
-    text = str(api.export(scene, "svg"))
-    return measured(text, picture, len(scene.layers), time.process_time() - started)
+    fit = {name: value for name, value in options.items() if name != LIMIT}
+    scene = api.fit(picture, shapes, **fit)  # type: ignore[arg-type] # "auto", where it can
+    text = str(api.export(scene, "svg", **{LIMIT: options.get(LIMIT)}))
+    drawing, drawn = measured(text, picture, len(scene.layers), time.process_time() - started)
+    return drawing._replace(parameters=parameters_of(scene)), drawn
 
 
 def _traced(
@@ -145,7 +159,17 @@ def through(path: Path, hands: list[str], shapes: int | str, options: dict[str, 
 
 # --- the page -----------------------------------------------------------------------------------------------
 
-COLUMNS = ("shapes", "numbers", "× artist's", "bytes", "gzip", "PSNR dB", "mean ΔE00", "seconds")
+COLUMNS = (
+    "shapes",
+    "parameters",
+    "numbers",
+    "× artist's",
+    "bytes",
+    "gzip",
+    "PSNR dB",
+    "mean ΔE00",
+    "seconds",
+)
 
 
 def table(icons: list[Icon]) -> Iterator[str]:
@@ -155,12 +179,11 @@ def table(icons: list[Icon]) -> Iterator[str]:
     for hand in icons[0].drawings:
         drawings = [icon.drawings[hand] for icon in icons]
         middle = Drawing(*np.median(np.array(drawings), axis=0).tolist())
-        times = np.median(
-            [d.numbers / max(i.drawings["artist"].numbers, 1) for d, i in zip(drawings, icons, strict=True)]
-        )
+        artists = np.array([max(icon.drawings["artist"].numbers, 1) for icon in icons])
+        times = np.median(np.array([drawing.numbers for drawing in drawings]) / artists)
         yield (
-            f"| {hand} | {middle.shapes:g} | {middle.numbers:g} | {times:.2f} | {middle.bytes:g} | {middle.gzipped:g} "
-            f"| {middle.psnr:.1f} | {middle.error:.2f} | {middle.seconds:.1f} |"
+            f"| {hand} | {middle.shapes:g} | {middle.parameters:g} | {middle.numbers:g} | {times:.2f} "
+            f"| {middle.bytes:g} | {middle.gzipped:g} | {middle.psnr:.1f} | {middle.error:.2f} | {middle.seconds:.1f} |"
         )
 
 
@@ -172,8 +195,8 @@ def compared(icons: list[Icon], hand: str = "sdf2vec", other: str = "vtracer") -
     zipped = [ours.gzipped < theirs.gzipped for ours, theirs in pairs]
     both = sum(a and b for a, b in zip(nearer, smaller, strict=True))
     return (
-        f"Of {len(pairs)} icons, {hand} takes fewer bytes than {other} on {sum(smaller)} (gzipped on {sum(zipped)}), is as "
-        f"near or nearer by mean ΔE00 on {sum(nearer)}, and is both on {both}."
+        f"Of {len(pairs)} icons, {hand} takes fewer bytes than {other} on {sum(smaller)} (gzipped on {sum(zipped)}), "
+        f"is as near or nearer by mean ΔE00 on {sum(nearer)}, and is both on {both}."
     )
 
 
@@ -185,15 +208,17 @@ def figure(icons: list[Icon]) -> bytes:
     return encode_png(halves.mean(axis=(1, 3)))
 
 
+ABOUT = """SVG icons made by others, drawn by resvg at {side} × {side} pixels with alpha, and that picture made \
+SVG again. Shapes: layers, of others the elements. Parameters: the numbers of the scene's shapes but 0, no \
+colours. Numbers: those of outlines, gradients and transforms in the SVG, no colours; then how many times the \
+artist's, the median of the icons' own. PSNR: premultiplied, alpha among the channels. ΔE00: the mean of \
+CIEDE2000, over white. Both of the SVG as resvg draws it. Seconds of user and system time."""
+
+
 def page(icons: list[Icon], command: str, shown: str) -> str:
     """The whole of it in Markdown."""
     hands = list(icons[0].drawings)
-    about = (
-        f"SVG icons made by others, drawn by resvg at {SIDE} × {SIDE} pixels with alpha, and that picture made SVG again. "
-        "Shapes: layers, of others the elements. Numbers: those of outlines, gradients and transforms in the SVG, no "
-        "colours; then how many times the artist's, the median of the icons' own. PSNR: premultiplied, alpha among the "
-        "channels. ΔE00: CIEDE2000, over white. Both of the SVG as resvg draws it. Seconds of user and system time."
-    )
+    about = ABOUT.format(side=SIDE)
     parts = ["# Icons made by others", f"    {command}", about, "\n".join(table(icons))]
     parts += [compared(icons)] if {"sdf2vec", "vtracer"} <= set(hands) else []
     parts += [f"![Some of them; from above: {', '.join(hands)}]({shown})"]
@@ -210,20 +235,22 @@ def main() -> None:
     parser.add_argument("--icons", type=int, default=ICONS)
     parser.add_argument("--kind", help="of the fit")
     parser.add_argument("--preset", help="of the fit")
+    parser.add_argument("--max-falloff", type=float, help="of the fit")
+    parser.add_argument("--svg-size-limit", type=int, help="of the export")
     parser.add_argument("--hands", default=",".join(HANDS), help="whose drawings are compared")
     parser.add_argument("-o", "--output", type=Path, required=True)
     options = parser.parse_args()
     hands = [hand for hand in options.hands.split(",") if hand != "vtracer" or vtracer.is_there()]
-    fit = {name: getattr(options, name) for name in ("kind", "preset") if getattr(options, name)}
+    given = {name: value for name, value in vars(options).items() if name in GIVEN and value is not None}
     shapes = "auto" if options.shapes == "auto" else int(options.shapes)
     shown: Path = options.output.with_suffix(".png")
-    said = "".join(f" --{name} {value}" for name, value in fit.items())
+    said = "".join(f" --{name.replace('_', '-')} {value}" for name, value in given.items())
     command = (
         f"python -m sdf2vec.bench.icons {options.folder.name} --shapes {shapes}{said} --icons {options.icons}"
     )
     icons: list[Icon] = []
     for path in chosen(options.folder, options.icons):
-        icon = through(path, hands, shapes, fit)
+        icon = through(path, hands, shapes, given)
         icons += [icon] if icon else []
         if icons and len(icons) % 10 == 0:  # it takes long
             write_atomically(options.output, page(icons, command, shown.name).encode())

@@ -109,9 +109,8 @@ TOOLS: dict[str, Callable[[Case, KnownScene, argparse.Namespace], Answer]] = {
 }
 
 
-def result(tool: str, case: Case, options: argparse.Namespace) -> Result:
+def result(tool: str, case: Case, known: KnownScene, options: argparse.Namespace) -> Result:
     """One scene through one tool."""
-    known = case.known
     answer = TOOLS[tool](case, known, options)
     verdict = judged(known, answer)
     print(
@@ -268,8 +267,10 @@ def main() -> None:
             for case in cases:
                 write_atomically(options.pictures / f"{case.name}.png", encode_png(case.known.pixels))
             continue
-        for tool, case in product(options.tool, cases):
-            found[tool].append(result(tool, case, options))
+        for case in cases:
+            known = case.known
+            for tool in options.tool:
+                found[tool].append(result(tool, case, known, options))
         if options.output:
             _write(found, options)
     if not options.pictures and not options.output:

@@ -144,12 +144,12 @@ def judged(known: KnownScene, answer: Answer) -> Verdict:
     alike = overlaps(visible(true), visible(answer.shapes)) >= ALIKE
     kinds = np.array([[a.kind == b.kind for b in answer.shapes] for a in true], bool).reshape(alike.shape)
     matched, outlines = pairs(alike & kinds), pairs(alike)
-    near = psnr(known.pixels, answer.pixels)
+    levels = np.rint(np.clip(answer.pixels, 0, 1) * 255)
+    near = psnr(known.pixels, (levels / 255).astype(np.float32))
     return Verdict(len(true), len(answer.shapes), matched, outlines, near, answer.seconds)
 
 
 def psnr(picture: Float32Array, other: Float32Array) -> float:
-    """Peak signal-to-noise ratio in dB of a picture and another, rounded to 8 bits."""
-    rounded = np.rint(np.clip(other, 0.0, 1.0) * 255) / 255
-    error = float(np.square(picture - rounded).mean(dtype=np.float64))
+    """Peak signal-to-noise ratio in dB, of equal pictures that of less than any level."""
+    error = float(np.square(picture - other).mean(dtype=np.float64))
     return min(-10 * math.log10(error), BEST) if error else BEST

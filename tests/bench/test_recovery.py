@@ -52,17 +52,6 @@ def known():
     return known_scene(8, "apart", False, 7)
 
 
-def with_first(known, change):
-    """The true scene with something done to its lowest layer."""
-    first, *others = known.scene.layers
-    return scene_answer(replace(known.scene, layers=(change(first), *others)))
-
-
-def of_another_kind(layer):
-    """The box around it where it is none, as an answer that sees the same pixels would have it."""
-    return replace(layer, shapes=(replace(layer.shapes[0], kind="ellipse"), *layer.shapes[1:]))
-
-
 def test_a_shape_of_another_kind_is_one_less(known):
     answer = scene_answer(known.scene)
     wrong = replace(answer, shapes=(answer.shapes[0]._replace(kind="displaced"), *answer.shapes[1:]))
@@ -149,4 +138,10 @@ def test_psnr_by_hand():
     black, red = np.zeros((2, 2, 3), np.float32), np.zeros((2, 2, 3), np.float32)
     red[..., 0] = 26 / 255
     assert psnr(black, red) == pytest.approx(20 * np.log10(255 / 26) + 10 * np.log10(3), abs=1e-4)
-    assert psnr(black, red * 0.01) == BEST  # less than half a level
+    assert psnr(black, black) == BEST
+
+
+def test_an_answer_is_seen_at_eight_bits():
+    flat = known_scene(0, "apart", False, 0)
+    assert judged(flat, Answer(flat.pixels + np.float32(0.4 / 255), ())).psnr == BEST
+    assert 48 < judged(flat, Answer(flat.pixels + np.float32(0.6 / 255), ())).psnr < 49
