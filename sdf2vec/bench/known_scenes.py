@@ -6,7 +6,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -53,8 +53,8 @@ def _color(chance: np.random.Generator) -> Color:
 
 
 def _shape(chance: np.random.Generator, size: float, soft: bool, side: int) -> KnownShape:
-    """A shape whose radius is about `size`, anywhere."""
-    x, y = chance.uniform(0, side, 2)
+    """A shape whose radius is about `size`, anywhere within the canvas."""
+    x, y = chance.uniform(size + GAP, side - size - GAP, 2)
     figure = _figure(chance, str(chance.choice(list(DISTANCES))), x, y, size)
     half = figure.sizes[0]
     cut = _cut(chance, figure) if half >= CUTTABLE and chance.random() < 0.3 else None
@@ -112,10 +112,13 @@ class Canvas:
     def add(self, shape: KnownShape, mode: str) -> bool:
         """Puts a shape on top, where it suits; tells whether it did."""
         x, y = grid(len(self.image))
+        reach = distance(shape.figure, x, y) < 1.1 * shape.falloff + GAP
+        at_edge = reach[[0, -1]].any() or reach[:, [0, -1]].any()
+        if at_edge or (mode == "apart" and (reach & self.near).any()):
+            return False
         cover = shape.cover(x, y)
         mask = cover >= 0.5
-        reach = distance(shape.figure, x, y) < 1.1 * shape.falloff + GAP
-        if not (mask.any() and self._is_seen(shape, mask) and self._has_place(mask, reach, mode)):
+        if (mode == "overlap" and not self._lies_well(mask)) or not self._is_seen(shape, mask):
             return False
         self.image += (shape.opacity * cover)[..., None] * (np.array(shape.color) - self.image)
         self.near |= reach
@@ -123,28 +126,24 @@ class Canvas:
             self.shown = [shown & ~mask for shown in self.shown]
         self.shapes.append(shape)
         self.masks.append(mask)
-        self.shown.append(mask.copy())
+        self.shown.append(mask)
         return True
 
-    def _is_seen(self, shape: KnownShape, mask: BoolArray) -> bool:
-        """Whether it changes the picture, and a hole in it can be told from none."""
-        change = shape.opacity * np.abs(np.array(shape.color) - self.image[mask]).max(axis=1)
-        x, y = grid(len(mask))
-        whole = KnownShape(shape.figure, shape.color, falloff=shape.falloff).cover(x, y) >= 0.5
-        return bool(
-            np.quantile(change, 0.1) >= CONTRAST and (not shape.cut or mask.sum() <= (1 - HOLE) * whole.sum())
-        )
-
-    def _has_place(self, mask: BoolArray, reach: BoolArray, mode: str) -> bool:
-        """Whether it is as near the others as the mode wants, and hides none of them too much."""
-        edge = np.concatenate([reach[[0, -1]].ravel(), reach[:, [0, -1]].ravel()])
-        if edge.any():
-            return False
-        if mode == "apart":
-            return not (reach & self.near).any()
+    def _lies_well(self, mask: BoolArray) -> bool:
+        """Whether it lies on others, if it is its turn, and hides none of them too much."""
         if len(self.masks) % 2 and (mask & np.any(self.masks, axis=0)).sum() < LAID_ON * mask.sum():
             return False
         return all(
             (shown & ~mask).sum() >= SHOWN * own.sum()
             for own, shown in zip(self.masks, self.shown, strict=True)
         )
+
+    def _is_seen(self, shape: KnownShape, mask: BoolArray) -> bool:
+        """Whether it changes the picture, and a hole in it can be told from none."""
+        if not mask.any():
+            return False
+        change = shape.opacity * np.abs(np.array(shape.color) - self.image[mask]).max(axis=1)
+        if np.quantile(change, 0.1) < CONTRAST:
+            return False
+        whole = replace(shape, cut=None).cover(*grid(len(mask))) >= 0.5
+        return not shape.cut or bool(mask.sum() <= (1 - HOLE) * whole.sum())

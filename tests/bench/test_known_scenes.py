@@ -113,11 +113,21 @@ def test_shapes_that_overlap_stay_in_sight(soft):
 
 
 @pytest.mark.parametrize("mode", MODES)
-def test_every_shape_changes_the_picture(mode):
-    """Without it, half of its pixels and more would be plainly different."""
-    known = known_scene(8, mode, False, 2)
-    for index, own in enumerate(masks_of(known)):
-        others = known.shapes[:index] + known.shapes[index + 1 :]
-        without = sampled(replace(known, shapes=others), samples=1)
-        change = np.abs(sampled(known, samples=1) - without).max(axis=2)[own]
-        assert (change > 0.05).mean() > 0.5
+def test_every_shape_can_be_seen(mode):
+    """Laid on those before it, it changes nine in ten of its pixels by 0.15 in some channel."""
+    for seed in range(3):
+        known = known_scene(12, mode, False, seed)
+        steps = [sampled(replace(known, shapes=known.shapes[:n]), samples=1) for n in range(13)]
+        for before, after, mask in zip(steps, steps[1:], masks_of(known), strict=False):
+            change = np.abs(after - before).max(axis=2)[mask]
+            assert np.quantile(change, 0.1) >= 0.15 - 1e-9
+
+
+def test_holes_can_be_seen():
+    """A cut-out takes three tenths of a figure at least, whatever its edge; there are some."""
+    x, y = grid(SIDE * 3)
+    cut = [s for seed in range(8) for s in known_scene(4, "apart", bool(seed % 2), seed).shapes if s.cut]
+    assert len(cut) >= 3
+    for shape in cut:
+        whole, own = (one.cover(x, y) >= 0.5 for one in (replace(shape, cut=None), shape))
+        assert own.sum() <= 0.7 * whole.sum()
