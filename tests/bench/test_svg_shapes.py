@@ -72,6 +72,7 @@ def test_what_is_not_seen_is_no_shape(require_engine):
         ),
         ('<path d="M0 0L5 0L9 0L4 7L0 0Z"/>', ["triangle"]),
         ('<path d="M0 0L9 0L4 7ZM20 20L29 20L24 27Z"/>', [None]),
+        ('<path d="M0 0L9 0M9 5L0 5Z"/>', [None]),
         ('<path d="M0 0C1 1 2 2 9 0L4 7Z"/>', [None]),
         ('<path d="M0 0L9 0L12 5L4 9L-2 5Z"/>', [None]),
         ('<g opacity="0.5"><circle r="3"/></g>', ["circle"]),
@@ -111,6 +112,7 @@ def test_transforms_by_hand(transform, point):
         ('<circle cx="1" cy="2" r="3" fill="#123456" opacity="0.5"/>', 3),
         ('<rect x="1" y="2" width="3" height="4" rx="1" transform="rotate(30 1 2)"/>', 8),
         ('<polygon points="1,2 3,4 5,6"/>', 6),
+        ('<mask x="0" y="0" width="9" height="9"><circle r="3"/></mask>', 1),
         (
             '<defs><linearGradient id="a" x1="0" x2="1"><stop offset="0.5" stop-color="#123"/></linearGradient></defs>',
             3,
