@@ -91,10 +91,18 @@ def masks_of(known):
 
 @pytest.mark.parametrize("soft", [False, True])
 def test_shapes_that_are_apart_do_not_touch(soft):
-    """Grown by two pixels, no pixel is in two of them; none is cut off by the edge of the picture."""
+    """Grown by a pixel, no pixel is in two of them."""
     grown = [binary_dilation(mask, iterations=1) for mask in masks_of(known_scene(16, "apart", soft, 1))]
     assert np.sum(grown, axis=0).max() == 1
-    assert not any(mask[[0, -1]].any() or mask[:, [0, -1]].any() for mask in grown)
+
+
+@pytest.mark.parametrize("mode", MODES)
+def test_no_shape_is_cut_off_by_the_edge(mode):
+    """Two pixels around the canvas are free, even where shapes are large."""
+    for seed in range(16):
+        covered = np.any(masks_of(known_scene(2, mode, bool(seed % 2), seed)), axis=0)
+        assert not covered[[0, 1, -2, -1]].any()
+        assert not covered[:, [0, 1, -2, -1]].any()
 
 
 @pytest.mark.parametrize("soft", [False, True])
