@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, Any, BinaryIO, Literal, NoReturn
 
 from msgspec.structs import replace
 
-from . import __version__, api
+from . import __version__, api, cached, guard
 from .declared import add_flags, check_choice, checked, chosen, options_of
 from .deferred import deferred
 from .errors import Sdf2vecError
@@ -48,32 +48,17 @@ TimeRemainingColumn = deferred("rich.progress", "TimeRemainingColumn")
 
 SET_HERE = ("title", "alone", "original")  # options of exports that have no flag
 STREAM = "-"
-OK, FAILED, INTERRUPTED = 0, 2, 130
 
 
 def main(argv: Sequence[str] | None = None) -> NoReturn:
-    """Entry point: exits with 0, with 2 after one line on stderr, or with 130 when interrupted twice."""
-    arguments = list(sys.argv[1:] if argv is None else argv)
+    """Entry point: exits with 0, with 2 after one line on stderr, with 70 after one that names a bug, and with 130
+    (SIGTERM: 143) when interrupted."""
+    guard.run(_run, list(sys.argv[1:] if argv is None else argv))
+
+
+def _run(arguments: list[str]) -> int:
     run = COMMANDS.get(arguments[0]) if arguments else None
-    try:
-        status = run(arguments[1:]) if run else _convert(arguments)
-        sys.stdout.flush()
-        sys.exit(status)
-    except Sdf2vecError as error:
-        _complain(str(error))
-        sys.exit(FAILED)
-    except KeyboardInterrupt:
-        _complain("interrupted")
-        sys.exit(INTERRUPTED)
-    except BrokenPipeError:  # whoever reads standard output has seen enough
-        sys.exit(OK)
-    except OSError as error:
-        _complain(f"{error.filename or 'standard output'}: {error.strerror or error}")
-        sys.exit(FAILED)
-
-
-def _complain(message: str) -> None:
-    print(f"sdf2vec: {one_line(message)}", file=sys.stderr)
+    return run(arguments[1:]) if run else _convert(arguments)
 
 
 class _Parser(argparse.ArgumentParser):
@@ -91,7 +76,8 @@ def _convert_parser() -> argparse.ArgumentParser:
         prog="sdf2vec",
         usage="sdf2vec INPUT... [--emit TARGETS] [-o OUT] [options]",
         description="Fits a few soft geometric shapes to pictures and exports them as mathematics.",
-        epilog="Other commands, each with its own --help: sdf2vec check | render | export",
+        epilog="Other commands, each with its own --help: sdf2vec check | render | export | cache. "
+        "--traceback shows where an error that is a bug came from.",
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
     parser.add_argument("inputs", nargs="+", metavar="INPUT", help="pictures; - reads standard input")
@@ -150,16 +136,15 @@ def _convert(arguments: list[str]) -> int:
     also_read = [given[name] for name in ("start", "weights") if name in given]
     jobs = _plan(options.inputs, targets, options.output, also_read)
     _check_settings(options, targets)
-    status = OK
+    status = guard.OK
     for job in jobs:
         try:
             stopped = _convert_one(job, options)
-        except Sdf2vecError as error:
-            _complain(str(error))
-            status = FAILED
+        except Exception as error:
+            status = max(status, guard.report(error))
             continue
         if stopped:
-            return INTERRUPTED
+            return stopped
     return status
 
 
@@ -171,8 +156,8 @@ def _check_settings(options: argparse.Namespace, targets: list[str]) -> None:
         exports.export(target, replace(_export_options(options), svg_size_limit=None))
 
 
-def _convert_one(job: _Job, options: argparse.Namespace) -> bool:
-    """Fits one picture and writes its exports; True when the user stopped the fit."""
+def _convert_one(job: _Job, options: argparse.Namespace) -> int:
+    """Fits one picture and writes its exports; the exit status where a signal stopped the fit, else 0."""
     say = _speaker(options.quiet, STREAM in job.outputs.values())
     picture = _read_picture(job.source)
     for note in picture.notes:
@@ -187,7 +172,7 @@ def _convert_one(job: _Job, options: argparse.Namespace) -> bool:
         say(f"{_name(job.source)}: {size}, {scene.shape_count} shapes, {quality}, {seconds:.1f} s{early}")
         original = encode_png(picture.pixels) if options.with_original else None
         _write_exports(scene, job, options, say, original)
-        return stop.requested
+        return stop.status
 
 
 def _described(scene: Scene, picture: Picture) -> str:
@@ -258,8 +243,7 @@ def _packed(target: str, data: bytes) -> str:
 
 def _write(path: str, data: bytes) -> None:
     if path == STREAM:
-        sys.stdout.buffer.write(data)
-        sys.stdout.buffer.flush()
+        guard.write_output(data)
     else:
         write_atomically(path, data)
 
@@ -343,9 +327,13 @@ def _stem(source: str) -> str:
 
 
 class _Stop:
-    """Set by the first Ctrl-C; the second one interrupts as usual."""
+    """Set by the first Ctrl-C or SIGTERM; the second one interrupts as usual."""
 
-    requested = False
+    status = guard.OK
+
+    @property
+    def requested(self) -> bool:
+        return self.status != guard.OK
 
 
 @contextmanager
@@ -353,14 +341,19 @@ def _stopping() -> Iterator[_Stop]:
     stop = _Stop()
 
     def request(number: int, frame: FrameType | None) -> None:
-        stop.requested = True
-        signal.signal(signal.SIGINT, signal.default_int_handler)
+        stop.status = guard.SIGNALLED + number
+        _restore(before)
 
-    before = signal.signal(signal.SIGINT, request)
+    before = {number: signal.signal(number, request) for number in (signal.SIGINT, signal.SIGTERM)}
     try:
         yield stop
     finally:
-        signal.signal(signal.SIGINT, before)
+        _restore(before)
+
+
+def _restore(handlers: Mapping[signal.Signals, Any]) -> None:
+    for number, handler in handlers.items():
+        signal.signal(number, handler)
 
 
 @contextmanager
@@ -395,7 +388,7 @@ def _speaker(quiet: bool, to_stderr: bool) -> Callable[[str], None]:
 
     def say(line: str) -> None:
         if not quiet:
-            print(one_line(line), file=sys.stderr if to_stderr else sys.stdout, flush=True)
+            guard.say(line, sys.stderr if to_stderr else sys.stdout)
 
     return say
 
@@ -438,7 +431,7 @@ def _write_scene_exports(
     _export_options(options)
     scene = _read_scene(options.scene)
     _write_exports(scene, job, options, _speaker(False, STREAM in job.outputs.values()))
-    return OK
+    return guard.OK
 
 
 def _check_command(arguments: list[str]) -> int:
@@ -454,7 +447,12 @@ def _check_command(arguments: list[str]) -> int:
     _print_table(results)
     if all(result.missing for result in results):
         raise Sdf2vecError(f"no engine could check anything: {results[0].missing}")
-    return OK if all(result.verdict != "differs" for result in results) else 1
+    return guard.OK if all(result.verdict != "differs" for result in results) else 1
+
+
+def _cache_command(arguments: list[str]) -> int:
+    about = "Where compiled kernels are kept, how large that is, and how to empty it."
+    return cached.command(_Parser(prog="sdf2vec cache", description=about), arguments)
 
 
 def _print_table(results: list[Check]) -> None:
@@ -488,6 +486,7 @@ COMMANDS: dict[str, Callable[[list[str]], int]] = {
     "check": _check_command,
     "render": _render_command,
     "export": _export_command,
+    "cache": _cache_command,
 }
 
 if __name__ == "__main__":

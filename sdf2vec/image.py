@@ -31,7 +31,7 @@ from .decoding import (
     read_all,
     shrinking,
 )
-from .limits import FITTED
+from .limits import CANVAS_SIDE, FITTED
 
 _FULL_SCALE = {"bool": 1, "uint8": 255, "uint16": 65535}
 _RANGE_SLACK = 0.01  # resampling overshoots 0..1 by a little; more than this is another scale
@@ -199,8 +199,8 @@ def _parts(image: Image.Image, name: str) -> _Parts:
 
 
 def _shrunk_note(width: int, height: int, colour: Image.Image) -> str:
-    limit = f"{FITTED.variable}={FITTED.number}"
-    return f"{width} × {height} pixels are read as {colour.width} × {colour.height} ({limit} megapixels)"
+    limits = f"at most {FITTED.number} megapixels ({FITTED.variable}) and {CANVAS_SIDE} a side"
+    return f"{width} × {height} pixels are read as {colour.width} × {colour.height}: {limits}"
 
 
 def _picture(parts: _Parts, name: str) -> Picture:

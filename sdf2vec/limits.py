@@ -33,13 +33,13 @@ class Limit:
         return f"or raise the limit: {self.variable}={-(-needed // self.unit) or 2 * self.number}"
 
 
-def whole_number(variable: str, usual: int | None = None, largest: int = MOST) -> int:
+def whole_number(variable: str, usual: int, largest: int = MOST) -> int:
     """A variable of the environment, or what is usual where it is not set.
 
     Raises Sdf2vecError for anything but a whole number from 1 on.
     """
     text = os.environ.get(variable, "").strip()
-    if not text and usual is not None:
+    if not text:
         return usual
     number = int(text) if text.isascii() and text.isdigit() and len(text) < 20 else 0
     if not 1 <= number <= largest:
@@ -55,6 +55,12 @@ FITTED = Limit("SDF2VEC_FIT_MEGAPIXELS", 12, 10**6)
 
 BYTES = Limit("SDF2VEC_MAX_MEGABYTES", 512, 10**6)
 """Larger files are refused, and streams that do not end."""
+
+CACHED = Limit("SDF2VEC_CACHE_MEGABYTES", 200, 10**6)
+"""Of compiled kernels, those that were used longest ago are removed beyond this."""
+
+THREADS = 256
+"""More threads are refused."""
 
 LONGEST_SIDE = 1_000_000
 """Pixels: decoders hold a pointer for each row."""
