@@ -127,10 +127,12 @@ def test_impossible_numbers_of_threads(folder, run, monkeypatch, text):
 # ---------------------------------------------------------------------------------------------- signals
 
 INTERRUPTED_SOON = """
-import os, runpy, signal, sys, threading
-threading.Timer(float(sys.argv[2]), os.kill, (os.getpid(), signal.SIGINT)).start()
+import os, signal, sys, threading
+program = compile(open(sys.argv[1]).read(), sys.argv[1], "exec")
+timer = threading.Timer(float(sys.argv[2]), os.kill, (os.getpid(), signal.SIGINT))
 sys.argv = sys.argv[1:2] + ["missing.png"] * 3
-runpy.run_path(sys.argv[0], run_name="__main__")
+timer.start()
+exec(program, {"__name__": "__main__"})
 """
 
 
@@ -167,6 +169,7 @@ def test_a_full_disk_keeps_the_old_output(scene):
 
 def test_a_cache_that_can_not_be_written_to_is_one_line(capsys):
     def work(arguments):
+        warnings.simplefilter("default")
         _warn_once(Path("/else/where"))
         warnings.warn("of a library", RuntimeWarning, stacklevel=1)
         return 0
