@@ -150,9 +150,10 @@ def _convert(arguments: list[str]) -> int:
 
 def _check_settings(options: argparse.Namespace, targets: list[str]) -> None:
     """Refuses impossible settings, and targets that can't hold such a scene, before any work is done."""
-    compositing = settings_of(**chosen(options, Settings)).compositing
-    exports = Exports(Scene(1, 1, (), compositing=compositing))
+    settings = settings_of(**chosen(options, Settings))
+    exports = Exports(Scene(1, 1, (), compositing=settings.compositing))
     for target in targets:
+        EXPORTERS[target].check_count(settings.shapes, _export_options(options))
         exports.export(target, replace(_export_options(options), svg_size_limit=None))
 
 

@@ -62,6 +62,9 @@ CACHED = Limit("SDF2VEC_CACHE_MEGABYTES", 200, 10**6)
 THREADS = 256
 """More threads are refused."""
 
+TEXT_SHAPES = 4096
+"""Shapes that a shader may hold in its text; more need data beside it."""
+
 LONGEST_SIDE = 1_000_000
 """Pixels: decoders hold a pointer for each row."""
 

@@ -7,7 +7,8 @@ from dataclasses import dataclass
 from functools import partial
 
 from ..deferred import deferred
-from ..scene import Scene
+from ..errors import Sdf2vecError
+from ..scene import MAX_SHAPES, Scene
 from .exported import Exported
 from .options import Accepts, Options
 
@@ -16,18 +17,31 @@ from .options import Accepts, Options
 class Exporter:
     """`suffix` is what a file name gets in place of the picture's; `about` is one line for the user.
 
-    `accepts` says which scenes `write` takes.
+    `accepts` says which scenes `write` takes, `most_shapes` how many shapes they may have.
     """
 
     suffix: str
     write: Callable[[Scene, Options], Exported]
     about: str
     accepts: Callable[[Options], Accepts] = lambda options: Accepts()
+    most_shapes: Callable[[Options], int] = lambda options: MAX_SHAPES
+
+    def check_count(self, count: int, options: Options) -> None:
+        """Raises Sdf2vecError for more shapes than the target can serve."""
+        most = self.most_shapes(options)
+        if count > most:
+            raise Sdf2vecError(
+                f"{self.suffix[1:]}: {count} shapes are more than its text can hold ({most}); "
+                "write glsl or wgsl to files, which hold data, or json, or fit fewer"
+            )
 
 
 def _shader(name: str, suffix: str, about: str) -> Exporter:
-    write = deferred("sdf2vec.export.shader", "exported")
-    return Exporter(suffix, partial(write, name=name, suffix=suffix), about)
+    module = "sdf2vec.export.shader"
+    write, most_shapes = deferred(module, "exported"), deferred(module, "most_shapes")
+    return Exporter(
+        suffix, partial(write, name=name, suffix=suffix), about, most_shapes=partial(most_shapes, name=name)
+    )
 
 
 def _svg(name: str, suffix: str, about: str) -> Exporter:

@@ -51,6 +51,7 @@ BLAME = (
     0.97  # of the largest share that a layer has in what is off at a pixel: who has so much gets more bits
 )
 WORST = 4096  # pixels that are looked at in each round
+BLAMED = 1 << 20  # layers × pixels that are looked at at a time
 FAINT = 0.05  # opacity below which layers are not told apart
 PLACE = "place"  # the precision of what lies in a layer's box: bits by how sharp its edge is
 
@@ -259,11 +260,13 @@ class _Packer:
 
     def to_blame(self, view: _View, chosen: IntArray, counts: IntArray) -> IntArray:
         """The layers whose coarse places can be why the picture is off at some pixels."""
-        cover = np.abs(view.coverages(self.scene, chosen))
         steep = np.array([self._steepness(*pair) for pair in zip(self.scene.layers, self.cells, strict=True)])
-        share = cover * (1.0 - cover) * (steep * 0.5**counts)[:, None]
-        guilty = (share >= BLAME * share.max(axis=0)) & (share > 0.0)
-        return np.nonzero(guilty.any(axis=1))[0]
+        heavy, guilty = (steep * 0.5**counts)[:, None], np.zeros(len(steep), bool)
+        for some in np.array_split(chosen, -(-len(chosen) * len(steep) // BLAMED)):
+            cover = np.abs(view.coverages(self.scene, some))
+            share = cover * (1.0 - cover) * heavy
+            guilty |= ((share >= BLAME * share.max(axis=0)) & (share > 0.0)).any(axis=1)
+        return np.nonzero(guilty)[0]
 
     def pack(self, precision: Precision, counts: Sequence[int], error: float) -> Packed:
         least = min(counts, default=1)
