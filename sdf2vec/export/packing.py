@@ -162,8 +162,11 @@ def _fewest_bits(
             return counts.tolist(), float(off.max())
         wrong = np.nonzero(off > limit)[0]
         worst = wrong[np.argsort(-off[wrong], kind="stable")[:WORST]]
+        before = counts.copy()
         counts[packer.to_blame(view, worst, counts)] += 1
         counts = np.minimum(counts, MOST_BITS)
+        if np.array_equal(counts, before):  # nobody can have more: no further round helps
+            return None
     return None
 
 

@@ -19,6 +19,7 @@ from .raster import png
 from .shader import DATA_WIDTH, Shader, most_shapes, shader
 from .svg import svg
 
+FALLBACK = 1 << 20  # pixels
 LABELS = {"shadertoy": "Shadertoy", "glsl": "GLSL", "wgsl": "WGSL", "svg": "SVG"}
 
 
@@ -62,6 +63,10 @@ def _floats(made: Shader) -> bytes:
 
 
 def _image(scene: Scene, options: Options) -> str:
+    """The render, of FALLBACK pixels at most, as part of a page."""
+    shortest, longest = sorted((scene.width, scene.height))
+    if shortest * longest > FALLBACK:
+        options = replace(options, size=max(1, int(shortest * (FALLBACK / shortest / longest) ** 0.5)))
     return f'<img src="{_data_url(png(scene, options).raw)}" alt="">'
 
 
