@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import io
+import logging
 import os
 import stat
 import tempfile
@@ -26,6 +27,8 @@ _PIECE = 1 << 20  # bytes read at a time
 _COUNTED = 1000  # frames of a TIFF
 _EXTRA_SAMPLES = 338  # the tag
 _KNOWN_EXTRA_SAMPLES = (0, 1, 2)  # unspecified, premultiplied alpha, straight alpha
+
+logging.getLogger("PIL").addHandler(logging.NullHandler())  # what it logs is in the exceptions, too
 
 _pillow_lock = threading.RLock()
 

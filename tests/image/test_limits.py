@@ -233,6 +233,13 @@ def test_pages_of_a_tiff_are_counted_to_a_bound():
     assert load(pages(1500)).notes == ("picture: more than 1000 frames, first one used",)
 
 
+def test_what_pillow_logs_is_not_printed(tmp_path):
+    path = tmp_path / "samples.tif"
+    path.write_bytes(tiff(2, 2, 42, 8, bytes(168), 1))
+    said, _ = read_apart(path)  # which wants nothing on standard error
+    assert "cannot be read" in said
+
+
 def test_what_libtiff_prints_is_said_in_the_line(tmp_path, capfd):
     data = bytearray(
         saved(Image.fromarray(noise(1, height=64, width=64)).convert("1"), "TIFF", compression="group4")
