@@ -4,13 +4,15 @@ import time
 
 import pytest
 
+import sdf2vec
+from tests.fuzz import domain
 from tests.fuzz.attacks import ATTACKS, attempt
 
 SHARES = {"pictures": (2000, 6.0), "arrays": (500, 2.0), "scenes": (60, 20.0), "options": (1000, 2.0)}
 """How many seeds, and after how many seconds no further one is begun."""
 
-FAILED = [("scenes", 0), ("scenes", 3)]
-"""Kept: what has failed once, by name and seed."""
+FAILED = [(0, "svg"), (3, "svg")]
+"""Kept: seeds of scenes that an export has failed at."""
 
 
 @pytest.mark.filterwarnings("ignore::RuntimeWarning")
@@ -25,6 +27,6 @@ def test_attacks(name):
 
 
 @pytest.mark.filterwarnings("ignore::RuntimeWarning")
-@pytest.mark.parametrize(("name", "seed"), FAILED)
-def test_what_has_failed_before(name, seed):
-    assert attempt(name, seed) == ""
+@pytest.mark.parametrize(("seed", "target"), FAILED)
+def test_what_has_failed_before(seed, target):
+    assert sdf2vec.export(domain.scene(seed, 3, 5, "over"), target)
