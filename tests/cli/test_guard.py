@@ -131,6 +131,7 @@ import os, signal, sys, threading
 program = compile(open(sys.argv[1]).read(), sys.argv[1], "exec")
 timer = threading.Timer(float(sys.argv[2]), os.kill, (os.getpid(), signal.SIGINT))
 sys.argv = sys.argv[1:2] + ["missing.png"] * 3
+timer.daemon = True  # where the program has ended before, there is nothing to interrupt
 timer.start()
 exec(program, {"__name__": "__main__"})
 """
