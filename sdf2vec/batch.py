@@ -7,8 +7,6 @@ import hashlib
 import math
 import multiprocessing
 import os
-import signal
-import sys
 from collections.abc import Iterator, Sequence
 from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
 from concurrent.futures.process import BrokenProcessPool
@@ -16,16 +14,20 @@ from contextlib import contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
 
+from . import guard
 from .converting import Done, Work, convert
 from .errors import Sdf2vecError
 from .export import EXPORTERS
 from .files import one_line
+from .guard import Problem
+from .limits import THREADS
 from .outputs import STREAM, Job
 from .progress import Stop, Teller, telling
-from .report import FAILED, OK, SKIPPED, STOPPED, Report, Row
+from .report import BUG, FAILED, OK, SKIPPED, STOPPED, Report, Row
 
 PICTURES = (".png", ".jpg", ".jpeg", ".webp", ".avif", ".tif", ".tiff", ".gif", ".bmp")
 LISTED = 10  # pictures that a line names
+KILLED = "the process that converted it was killed (too little memory?)"
 
 
 # --- which pictures -------------------------------------------------------------------------------------------
@@ -91,6 +93,7 @@ class Batch:
     work: Work
     report: Report
     rows: dict[str, Row] = field(default_factory=dict)
+    problems: list[Problem] = field(default_factory=list)
 
     def todo(self) -> list[Job]:
         """The pictures that neither the report nor `--skip-existing` says to be done."""
@@ -123,10 +126,12 @@ class Batch:
         numbers = (done.shapes, psnr, done.flip, done.bytes, round(done.seconds, 3))
         self._take(Row(job.source, status, *numbers, settings=self.settings_of(job)))
 
-    def failed(self, job: Job, error: str) -> None:
+    def failed(self, job: Job, problem: Problem) -> None:
         """Says what went wrong."""
-        print(f"sdf2vec: {one_line(error)}", file=sys.stderr)
-        self._take(Row(job.source, FAILED, error=one_line(error)))
+        problem.complain()
+        self.problems.append(problem)
+        status = BUG if problem.status == guard.BUG else FAILED
+        self._take(Row(job.source, status, error=one_line(problem.line)))
 
     def _take(self, row: Row) -> None:
         self.rows[row.file] = row
@@ -161,8 +166,8 @@ def _one_by_one(batch: Batch, todo: list[Job], stop: Stop) -> None:
         try:
             with telling(running, STREAM in job.outputs.values(), counted) as teller:
                 done = convert(job, batch.work, teller, stop)
-        except Sdf2vecError as error:
-            batch.failed(job, str(error))
+        except Exception as error:  # whatever it is, the other pictures can do without it
+            batch.failed(job, guard.problem_of(error))
         else:
             batch.done(job, done)
         if stop.requested:
@@ -183,17 +188,15 @@ def _in_processes(batch: Batch, todo: list[Job], several: int, stop: Stop) -> No
                 with _workers(1) as pool:
                     again = _until_killed(batch, [job], pool, 1, stop, teller)
                 if again:
-                    batch.failed(
-                        job, f"{job.source}: the process that converted it was killed (too little memory?)"
-                    )
+                    batch.failed(job, Problem(f"{job.source}: {KILLED}"))
 
 
 @contextmanager
 def _workers(several: int) -> Iterator[ProcessPoolExecutor]:
     """So many processes, which share the cores, and leave Ctrl-C to this one."""
-    threads = max(1, (os.cpu_count() or 1) // several)
+    threads = min(max(1, (os.cpu_count() or 1) // several), THREADS)
     context = multiprocessing.get_context("spawn")
-    pool = ProcessPoolExecutor(several, context, _begin_worker, (threads,))
+    pool = ProcessPoolExecutor(several, context, _begin_worker, (threads, guard.Output.show))
     try:
         yield pool
     except KeyboardInterrupt:
@@ -204,8 +207,8 @@ def _workers(several: int) -> Iterator[ProcessPoolExecutor]:
         pool.shutdown(cancel_futures=True)
 
 
-def _begin_worker(threads: int) -> None:
-    signal.signal(signal.SIGINT, signal.SIG_IGN)
+def _begin_worker(threads: int, show: bool) -> None:
+    guard.begin_worker(show)
     os.environ.setdefault("SDF2VEC_THREADS", str(threads))
 
 
@@ -213,7 +216,7 @@ def _until_killed(
     batch: Batch, waiting: list[Job], pool: ProcessPoolExecutor, several: int, stop: Stop, teller: Teller
 ) -> list[Job]:
     """Converts the last of the waiting pictures first; those that were under way when a process was killed."""
-    under_way: dict[Future[tuple[Done | str, list[str]]], Job] = {}
+    under_way: dict[Future[tuple[Done | Problem, list[str]]], Job] = {}
     killed: list[Job] = []
     while (under_way or (waiting and not stop.requested)) and not (killed and not under_way):
         while waiting and len(under_way) < several and not stop.requested and not killed:
@@ -232,20 +235,20 @@ def _until_killed(
                 continue
             for line in lines:
                 teller.say(line)
-            if isinstance(done, str):
+            if isinstance(done, Problem):
                 batch.failed(job, done)
             else:
                 batch.done(job, done)
     return killed
 
 
-def _converted(job: Job, work: Work) -> tuple[Done | str, list[str]]:
+def _converted(job: Job, work: Work) -> tuple[Done | Problem, list[str]]:
     """In a process of its own: what came of a picture, or what went wrong; and the lines to say."""
     teller = Teller(work.running, lines=[])
     try:
         return convert(job, work, teller, Stop()), teller.lines or []
-    except Sdf2vecError as error:
-        return str(error), teller.lines or []
+    except Exception as error:
+        return guard.problem_of(error), teller.lines or []
 
 
 # --- what is said at the end ----------------------------------------------------------------------------------
@@ -254,9 +257,16 @@ def _converted(job: Job, work: Work) -> tuple[Done | str, list[str]]:
 def about(batch: Batch) -> str:
     """One line on all pictures."""
     counts = {"done": batch.count(OK) + batch.count(STOPPED)}
-    counts |= {status: batch.count(status) for status in (SKIPPED, FAILED)} | {"not begun": len(batch.left())}
+    counts |= {status: batch.count(status) for status in (SKIPPED, FAILED)}
+    counts |= {"failed by a bug": batch.count(BUG), "not begun": len(batch.left())}
     told = ", ".join(f"{count} {name}" for name, count in counts.items() if count or name == "done")
     return f"{len(batch.jobs)} pictures: {told}"
+
+
+def exit_status(batch: Batch) -> int:
+    """0, 2 where nothing could be done, 3 where some pictures failed; more than that for what is graver."""
+    worst = max((problem.status for problem in batch.problems), default=guard.OK)
+    return guard.PARTLY if worst == guard.FAILED and len(batch.problems) < len(batch.jobs) else worst
 
 
 def about_left(batch: Batch) -> str:

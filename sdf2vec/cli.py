@@ -13,8 +13,8 @@ from typing import TYPE_CHECKING, Literal, NoReturn
 
 from msgspec.structs import replace
 
-from . import __version__
-from .batch import Batch, about, about_left, run_batch, sources_of
+from . import __version__, cached, guard
+from .batch import Batch, about, about_left, exit_status, run_batch, sources_of
 from .converting import Work, standard_input, write_exports
 from .declared import add_flags, checked, chosen, options_of
 from .deferred import deferred
@@ -22,7 +22,6 @@ from .errors import Sdf2vecError
 from .export import EXPORTERS
 from .export.options import Options
 from .exports import Exports
-from .files import one_line
 from .fit.settings import Settings, settings_of
 from .outputs import STREAM, Places, places_of, plan, read_exports
 from .progress import Teller, stopping, telling
@@ -43,32 +42,18 @@ escape: Callable[[str], str] = deferred("rich.markup", "escape")
 SET_HERE = ("alone", "original")  # options of exports that have no flag
 OF_FITS = ("with_original", "recursive", "skip_existing", "jobs", "report")  # what only fits heed of a run
 PICTURES = ("png", "jpg", "webp")
-OK, DIFFERS, FAILED, PARTLY, INTERRUPTED = 0, 1, 2, 3, 130
+DIFFERS = 1  # exit status of a check
 
 
 def main(argv: Sequence[str] | None = None) -> NoReturn:
-    """Entry point: exits with 0; 2 after one line on stderr; 3 where some pictures failed; 130 when interrupted."""
-    arguments = list(sys.argv[1:] if argv is None else argv)
+    """Entry point: exits with 0; 2 after one line on stderr; 3 where some pictures failed; 70 after a line that names
+    a bug; 130 (SIGTERM: 143) when interrupted."""
+    guard.run(_run, list(sys.argv[1:] if argv is None else argv))
+
+
+def _run(arguments: list[str]) -> int:
     run = COMMANDS.get(arguments[0]) if arguments else None
-    try:
-        status = run(arguments[1:]) if run else _convert(arguments)
-        sys.stdout.flush()
-        sys.exit(status)
-    except Sdf2vecError as error:
-        _complain(str(error))
-        sys.exit(FAILED)
-    except KeyboardInterrupt:
-        _complain("interrupted")
-        sys.exit(INTERRUPTED)
-    except BrokenPipeError:  # whoever reads standard output has seen enough
-        sys.exit(OK)
-    except OSError as error:
-        _complain(f"{error.filename or 'standard output'}: {error.strerror or error}")
-        sys.exit(FAILED)
-
-
-def _complain(message: str) -> None:
-    print(f"sdf2vec: {one_line(message)}", file=sys.stderr)
+    return run(arguments[1:]) if run else _convert(arguments)
 
 
 class _Parser(argparse.ArgumentParser):
@@ -86,7 +71,8 @@ def _convert_parser() -> argparse.ArgumentParser:
         prog="sdf2vec",
         usage="sdf2vec INPUT... [--emit TARGETS] [-o OUT] [options]",
         description="Fits a few soft geometric shapes to pictures and exports them as mathematics.",
-        epilog="Other commands, each with its own --help: sdf2vec check | render | export",
+        epilog="Other commands, each with its own --help: sdf2vec check | render | export | cache. "
+        "--traceback shows where an error that is a bug came from.",
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
     parser.add_argument(
@@ -150,7 +136,7 @@ def _convert(arguments: list[str]) -> int:
     also_read = [given[name] for name in ("start", "weights") if name in given]
     jobs = plan(sources_of(options.inputs, running.recursive), places, also_read, running.force)
     work = Work(given, _export_options(options, places.targets), running)
-    _check_settings(work, places.targets)
+    _check_settings(work, places)
     batch = Batch(jobs, work, Report(running.report, running.force))
     with stopping() as stop:
         try:
@@ -158,21 +144,20 @@ def _convert(arguments: list[str]) -> int:
         finally:
             left = about_left(batch)
             if left and len(jobs) > 1:
-                _complain(left)
+                guard.complain(left)
     if len(jobs) > 1:
         Teller(running, to_stderr=any(STREAM in job.outputs.values() for job in jobs)).say(about(batch))
-    if stop.requested:
-        return INTERRUPTED
-    failed = batch.count("failed")
-    return OK if not failed else FAILED if failed == len(jobs) else PARTLY
+    return stop.status or exit_status(batch)
 
 
-def _check_settings(work: Work, targets: Sequence[str]) -> None:
+def _check_settings(work: Work, places: Places) -> None:
     """Refuses impossible settings, and targets that can't hold such a scene, before any work is done."""
-    compositing = settings_of(**work.fit).compositing
-    exports = Exports(Scene(1, 1, (), compositing=compositing))
-    for target in targets:
-        exports.export(target, replace(work.export, svg_size_limit=None))
+    settings = settings_of(**work.fit)
+    exports = Exports(Scene(1, 1, (), compositing=settings.compositing))
+    for target in places.targets:
+        options = replace(work.export, svg_size_limit=None, alone=places.files.get(target) == STREAM)
+        EXPORTERS[target].check_count(settings.shapes, options)
+        exports.export(target, options)
 
 
 # --- scene files --------------------------------------------------------------------------------------------
@@ -222,7 +207,7 @@ def _write_scene_exports(options: argparse.Namespace, places: Places) -> int:
         write_exports(_read_scene(options.scene), job, export, teller)
         if running.verbose:
             teller.say(f"  {time.perf_counter() - started:.1f} s in all: {teller.about_phases()}")
-    return OK
+    return guard.OK
 
 
 def _check_command(arguments: list[str]) -> int:
@@ -252,7 +237,12 @@ def _check_command(arguments: list[str]) -> int:
         raise Sdf2vecError(f"no engine could check anything: {results[0].missing}")
     if running.verbose and not options.json:
         teller.say(f"{teller.seconds['check']:.1f} s in all")
-    return OK if all(result.verdict != "differs" for result in results) else DIFFERS
+    return guard.OK if all(result.verdict != "differs" for result in results) else DIFFERS
+
+
+def _cache_command(arguments: list[str]) -> int:
+    about = "Where compiled kernels are kept, how large that is, and how to empty it."
+    return cached.command(_Parser(prog="sdf2vec cache", description=about), arguments)
 
 
 def _scene_and_files(files: Sequence[str]) -> tuple[str, list[str]]:
@@ -306,6 +296,7 @@ COMMANDS: dict[str, Callable[[list[str]], int]] = {
     "check": _check_command,
     "render": _render_command,
     "export": _export_command,
+    "cache": _cache_command,
 }
 
 if __name__ == "__main__":

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import gzip
+import os
 import sys
 import time
 from collections.abc import Callable, Mapping
@@ -12,7 +13,7 @@ from typing import TYPE_CHECKING, Any, BinaryIO
 
 from msgspec.structs import replace
 
-from . import api
+from . import api, guard
 from .deferred import deferred
 from .errors import Sdf2vecError
 from .export import EXPORTERS
@@ -117,7 +118,7 @@ def _read_picture(source: str) -> Picture:
 
 def _original(source: str, picture: Picture) -> bytes:
     """The file's own bytes where a browser shows what was read of it, else a PNG of that."""
-    data = b"" if source == STREAM else Path(source).read_bytes()
+    data = Path(source).read_bytes() if os.path.isfile(source) else b""  # a stream is at its end
     return data if shown_as(data) else encode_png(picture.pixels)
 
 
@@ -179,8 +180,7 @@ def _packed(target: str, data: bytes) -> str:
 
 def _write(path: str, data: bytes) -> None:
     if path == STREAM:
-        sys.stdout.buffer.write(data)
-        sys.stdout.buffer.flush()
+        guard.write_output(data)
     else:
         write_atomically(path, data)
 

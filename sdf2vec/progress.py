@@ -6,14 +6,14 @@ import math
 import signal
 import sys
 import time
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from types import FrameType
 from typing import TYPE_CHECKING, Any
 
+from . import guard
 from .deferred import deferred
-from .files import one_line
 from .running import Running
 
 if TYPE_CHECKING:
@@ -45,7 +45,7 @@ class Teller:
             self.lines.append(line)
             return
         with self._without_bar():
-            print(one_line(line), file=sys.stderr if self.to_stderr else sys.stdout, flush=True)
+            guard.say(line, sys.stderr if self.to_stderr else sys.stdout)
 
     def say_all(self, text: str) -> None:
         """Prints several lines as they are, unless the run is quiet."""
@@ -125,22 +125,32 @@ def telling(running: Running, to_stderr: bool = False, which: str = "") -> Itera
 
 
 class Stop:
-    """Set by the first Ctrl-C; the second one interrupts as usual."""
+    """Set by the first Ctrl-C or SIGTERM; the second one interrupts as usual."""
 
-    requested = False
+    status = guard.OK
+
+    @property
+    def requested(self) -> bool:
+        """Whether the run is to end."""
+        return self.status != guard.OK
 
 
 @contextmanager
 def stopping() -> Iterator[Stop]:
-    """The first Ctrl-C within asks for an end."""
+    """The first Ctrl-C or SIGTERM within asks for an end."""
     stop = Stop()
 
     def request(number: int, frame: FrameType | None) -> None:
-        stop.requested = True
-        signal.signal(signal.SIGINT, signal.default_int_handler)
+        stop.status = guard.SIGNALLED + number
+        _restore(before)
 
-    before = signal.signal(signal.SIGINT, request)
+    before = {number: signal.signal(number, request) for number in (signal.SIGINT, signal.SIGTERM)}
     try:
         yield stop
     finally:
-        signal.signal(signal.SIGINT, before)
+        _restore(before)
+
+
+def _restore(handlers: Mapping[signal.Signals, Any]) -> None:
+    for number, handler in handlers.items():
+        signal.signal(number, handler)

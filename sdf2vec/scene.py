@@ -22,6 +22,7 @@ from msgspec import Meta
 from .blend import COMPOSITING, JOINS, OVER, UNION
 from .errors import Sdf2vecError
 from .layer import JOIN, LOOK, Part, Structure
+from .limits import CANVAS_SIDE
 from .paints import BASE, FLAT, PAINTS
 from .shapes import KINDS
 from .units import BACKGROUND, COLOR, Parameter
@@ -29,9 +30,7 @@ from .units import BACKGROUND, COLOR, Parameter
 MAX_SHAPES = 65536
 MAX_JOINED = 128  # shapes in one layer: each is a term of one formula
 
-MOST_PIXELS = 65536  # along a side of a canvas
-
-Side = Annotated[int, Meta(ge=1, le=MOST_PIXELS)]
+Side = Annotated[int, Meta(ge=1, le=CANVAS_SIDE)]  # pixels
 Joined = Annotated[list[Any], Meta(min_length=1, max_length=MAX_JOINED)]
 Color = tuple[float, float, float]
 Value = float | tuple[float, ...]  # of a parameter

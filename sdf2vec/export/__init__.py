@@ -7,7 +7,8 @@ from dataclasses import dataclass
 from functools import partial
 
 from ..deferred import deferred
-from ..scene import Scene
+from ..errors import Sdf2vecError
+from ..scene import MAX_SHAPES, Scene
 from ..scene_file import FORMAT
 from .exported import MARK, Exported
 from .options import Accepts, Options
@@ -17,9 +18,9 @@ from .options import Accepts, Options
 class Exporter:
     """`suffix` is what a file name gets in place of the picture's; `about` is one line for the user.
 
-    `accepts` says which scenes `write` takes; `heeds` names the options that matter to it; other files that it may
-    write end in `beside`. A file that ends in one of `endings` is taken to be for it; one that holds `mark` was made
-    by it.
+    `accepts` says which scenes `write` takes, `most_shapes` how many shapes they may have; `heeds` names the options
+    that matter to it; other files that it may write end in `beside`. A file that ends in one of `endings` is taken to
+    be for it; one that holds `mark` was made by it.
     """
 
     suffix: str
@@ -30,11 +31,21 @@ class Exporter:
     other_endings: tuple[str, ...] = ()
     beside: tuple[str, ...] = ()
     mark: bytes = MARK.encode()
+    most_shapes: Callable[[Options], int] = lambda options: MAX_SHAPES
 
     @property
     def endings(self) -> tuple[str, ...]:
         """What its files may end in."""
         return (self.suffix, *self.other_endings)
+
+    def check_count(self, count: int, options: Options) -> None:
+        """Raises Sdf2vecError for more shapes than the target can serve."""
+        most = self.most_shapes(options)
+        if count > most:
+            raise Sdf2vecError(
+                f"{self.suffix[1:]}: {count} shapes are more than its text can hold ({most}); "
+                "write glsl or wgsl to files, which hold data, or json, or fit fewer"
+            )
 
 
 def _shader(
@@ -45,9 +56,16 @@ def _shader(
     endings: tuple[str, ...] = (),
     beside: tuple[str, ...] = (),
 ) -> Exporter:
-    write = partial(deferred("sdf2vec.export.shader", "exported"), name=name, suffix=suffix)
+    module = "sdf2vec.export.shader"
+    write, most_shapes = deferred(module, "exported"), deferred(module, "most_shapes")
     return Exporter(
-        suffix, write, about, heeds=("layout", *heeds, "title"), other_endings=endings, beside=beside
+        suffix,
+        partial(write, name=name, suffix=suffix),
+        about,
+        heeds=("layout", *heeds, "title"),
+        other_endings=endings,
+        beside=beside,
+        most_shapes=partial(most_shapes, name=name),
     )
 
 

@@ -9,11 +9,12 @@ from ..blend import COMPOSITING, FRAMINGS, JOINS, display, grid_point, union_rea
 from ..expr import Expr, var
 from ..graph import scalarize
 from ..layer import JOIN, LOOK, PIXEL, Formula, P, Part
+from ..limits import CANVAS_SIDE
 from ..lower.javascript import function_text
 from ..lower.shader import GLSL, definition, expression, used_functions
 from ..operation import VEC2, VEC4
 from ..paints import FLAT, PAINTS
-from ..scene import GROUND, MAX_JOINED, MAX_SHAPES, MOST_PIXELS, OPTIONAL, Scene
+from ..scene import GROUND, MAX_JOINED, MAX_SHAPES, OPTIONAL, Scene
 from ..scene_file import FORMAT, VERSION
 from ..shapes import KINDS
 from ..templating import template
@@ -45,7 +46,7 @@ def component(scene: Scene, options: Options) -> Exported:
         join=json.dumps(_told(JOIN)),
         ground=json.dumps(_told(GROUND)),
         patches=json.dumps([kind.name for kind in KINDS.values() if kind.patch is not None]),
-        most_pixels=MOST_PIXELS,
+        most_pixels=CANVAS_SIDE,
         most_shapes=MAX_SHAPES,
         most_joined=MAX_JOINED,
         joins=json.dumps(list(JOINS)),

@@ -15,10 +15,11 @@ from ..deferred import deferred
 from ..errors import Sdf2vecError
 from ..expr import Expr, const, var, vec2, vec4
 from ..layer import STILL, Formula, P, constant_row
+from ..limits import TEXT_SHAPES
 from ..lower.shader import GLSL, WGSL, Dialect, definition, expression, literal, statements, used_functions
 from ..operation import VEC2, VEC4
 from ..paints import FLAT
-from ..scene import Layer, Scene
+from ..scene import MAX_SHAPES, Layer, Scene
 from ..templating import template
 from .exported import Exported
 from .layouts import (
@@ -131,6 +132,11 @@ def files_beside(made: Shader, suffix: str) -> dict[str, bytes]:
         data=base64.b64encode(raw).decode(), rows=len(made.data), width=DATA_WIDTH
     )
     return {f"{suffix}.bin": raw, f"{suffix}.data.js": module.encode()}
+
+
+def most_shapes(options: Options, name: str) -> int:
+    """How many shapes a target can serve."""
+    return MAX_SHAPES if "data" in _host(TARGETS[name], options).layouts else TEXT_SHAPES
 
 
 def _host(target: Target, options: Options) -> Host:

@@ -202,6 +202,45 @@ def killed(job, work):
     return converting.Done(3, 20.0, 0.1, 9, 0.1, False), []
 
 
+def broken(*_):
+    raise KeyError("what")
+
+
+def test_a_bug_in_one_picture_leaves_the_others(album, run, monkeypatch):
+    """Its row and the last line say so; the bug decides on the exit code, whatever else has failed."""
+    load = converting.load_picture
+    (album / "album/bad.png").write_bytes(b"no picture")
+    with monkeypatch.context() as patched:
+        patched.setattr(converting, "load_picture", lambda p: broken() if p == "album/a.png" else load(p))
+        outcome = run("album", *SHORT, *JSON, "-o", "out", "--report", "r.jsonl")
+    assert outcome.code == 70
+    assert outcome.out.endswith(b"3 pictures: 1 done, 1 failed, 1 failed by a bug\n")
+    rows = {row["file"]: row for row in rows_of(album / "r.jsonl")}
+    assert [row["status"] for row in rows.values()] == ["bug", "ok", "failed"]
+    assert rows["album/a.png"]["error"].startswith("this is a bug: KeyError: 'what' in _read_picture, line ")
+    assert run("album", *SHORT, *JSON, "-o", "out", "--report", "r.jsonl").code == 3
+    assert [row["status"] for row in rows_of(album / "r.jsonl")] == ["ok", "ok", "failed"]
+
+
+@pytest.mark.parametrize("traceback", [False, True])
+def test_a_bug_in_a_process(folder, run, monkeypatch, traceback):
+    picture(seed=1).save("other.png")
+    monkeypatch.setattr(batch, "_converted", with_a_bug)
+    outcome = run("photo.jpg", "other.png", *SHORT, *JSON, "--jobs", "2", *["--traceback"] * traceback)
+    assert outcome.code == 70
+    assert "sdf2vec: this is a bug: KeyError: 'what'" in outcome.err
+    assert (", in broken\n" in outcome.err) == traceback
+    assert outcome.out == b"2 pictures: 1 done, 1 failed by a bug\n"
+
+
+def with_a_bug(job, work, really=batch._converted):
+    """In a process of its own."""
+    if job.source != "other.png":
+        return killed(job, work)
+    batch.convert = broken  # type: ignore[attr-defined]
+    return really(job, work)
+
+
 def test_a_bad_report_is_refused(folder, run):
     (folder / "mine.csv").write_text("a,b\n1,2\n")
     assert_refused(run("photo.jpg", *SHORT, "--report", "mine.csv"), "mine.csv", "--force")
