@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from base64 import b64encode
 from collections.abc import Callable, Iterable, Sequence
 from typing import TYPE_CHECKING, Any, Literal
 
@@ -11,7 +12,7 @@ from .export.exported import Exported
 from .export.options import Options
 from .exports import Exports
 from .fit.settings import Settings, settings_of
-from .scene import Scene
+from .scene import SHOWN, Scene
 
 if TYPE_CHECKING:
     from .arrays import Float32Array
@@ -20,6 +21,7 @@ if TYPE_CHECKING:
     from .image import Picture
     from .roundtrip import Check, Size
 
+NOTEBOOK = 512  # shortest side, in pixels, of what a notebook shows
 _load_picture: Callable[[Any], Picture] = deferred("sdf2vec.image", "load")
 _fitted_picture: Callable[..., Fitted] = deferred("sdf2vec.fit.auto", "fitted_picture")
 _render: Callable[..., Float32Array] = deferred("sdf2vec.render.draw", "pixels_of")
@@ -57,12 +59,19 @@ def fitted(
 
 
 def render(scene: Scene, width: int | None = None, height: int | None = None) -> Float32Array:
-    """The scene as an array [height, width, 3], or [.., 4] with straight alpha when it is transparent; 0..1."""
+    """The scene as an array [height, width, 3], or [.., 4] with straight alpha when it is transparent; 0..1.
+
+    Of one side alone the other follows, in the scene's proportions; without any it has the size of the fitted picture.
+    """
+    if width and not height:
+        height = max(1, round(width * scene.height / scene.width))
+    elif height and not width:
+        width = max(1, round(height * scene.width / scene.height))
     return _render(scene, width, height)
 
 
 def export(scene: Scene, target: str, **options: Any) -> str | bytes:
-    """The scene in a target format, a key of `sdf2vec.export.EXPORTERS`: text, or bytes for "png" and "pdf".
+    """The scene in a target format, a key of `sdf2vec.export.EXPORTERS`: text, or bytes for "pdf" and pictures.
 
     Options: those of `exported`. Raises Sdf2vecError.
     """
@@ -76,6 +85,13 @@ def exported(scene: Scene, target: str, **options: Any) -> Exported:
     Raises Sdf2vecError for an unknown target and for what can't be exported.
     """
     return Exports(scene).export(target, checked(Options, options))
+
+
+def _png(scene: Scene) -> str:
+    return b64encode(exported(scene, "png", size=min(NOTEBOOK, scene.width, scene.height)).raw).decode()
+
+
+SHOWN |= {"image/png": _png, "image/svg+xml": lambda scene: str(export(scene, "svg"))}
 
 
 def check(

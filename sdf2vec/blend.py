@@ -182,8 +182,16 @@ def _framing(pick: Callable[[Expr, Expr], Expr], does: str) -> tuple[Function, F
 
 
 # How a scene meets a canvas of another shape: the point and the size of a pixel.
+CROP = "crop"  # fits, with the ground around it
 FRAMINGS = {"fit": _framing(maximum, "fits into"), "cover": _framing(minimum, "covers")}
+FRAMINGS[CROP] = FRAMINGS["fit"]
 scene_point, pixel_size = FRAMINGS["fit"]
+
+
+def cropped(color: Expr, p: Expr, size: Expr, ground: Expr) -> Expr:
+    """The colour at p within a scene of this size, the ground outside."""
+    beyond = [absolute(at) - 0.5 * side for at, side in ((p.x, size.x), (p.y, size.y))]
+    return select(maximum(*beyond) > 0.0, ground, color)
 
 
 @function("surfacePoint", uv=VEC2, size=VEC2)

@@ -9,6 +9,7 @@ from __future__ import annotations
 import argparse
 from collections.abc import Callable, Collection, Container, Mapping
 from dataclasses import dataclass
+from difflib import get_close_matches
 from functools import cache
 from numbers import Integral, Real
 from types import NoneType
@@ -34,9 +35,9 @@ def choice(title: str, description: str, known: Collection[str]) -> msgspec.Meta
     return msgspec.Meta(title=title, description=description, extra={"known": known})
 
 
-def plain(description: str, metavar: str | None = None) -> msgspec.Meta:
-    """Anything: a switch, or what is read elsewhere."""
-    return msgspec.Meta(description=description, extra={"metavar": metavar})
+def plain(description: str, metavar: str | None = None, short: str = "") -> msgspec.Meta:
+    """Anything: a switch, or what is read elsewhere; `short` is a letter that is a flag, too."""
+    return msgspec.Meta(description=description, extra={"metavar": metavar, "short": short})
 
 
 @dataclass(frozen=True)
@@ -62,6 +63,11 @@ class Option:
     @property
     def _extra(self) -> dict[str, Any]:
         return self.meta.extra or {}
+
+    @property
+    def flag(self) -> str:
+        """How it is called on the command line."""
+        return f"--{self.name.replace('_', '-')}"
 
     @property
     def help(self) -> str:
@@ -92,8 +98,9 @@ class Option:
         if self.type is not bool:
             form = {"type": self._read if self.type in NUMBERS else str}
             form["metavar"] = self._extra.get("metavar")
-        flag = f"--{self.name.replace('_', '-')}"
-        parser.add_argument(flag, default=argparse.SUPPRESS, help=self.help.replace("%", "%%"), **form)
+        short = [f"-{self._extra['short']}"] if self._extra.get("short") else []
+        told = self.help.replace("%", "%%")
+        parser.add_argument(*short, self.flag, default=argparse.SUPPRESS, help=told, **form)
 
     def _read(self, text: str) -> Any:
         """A number, or a word in its place. Raises ArgumentTypeError for anything else."""
@@ -144,7 +151,13 @@ def _plain(value: Any) -> Any:
 
 def checked(record: type[Record], given: Mapping[str, Any]) -> Record:
     """A record of the values given. Raises Sdf2vecError for the first impossible one, TypeError for an unknown name."""
-    made, options = record(**given), options_of(record)
+    options = options_of(record)
+    for name in given:
+        if name not in options:
+            near = get_close_matches(name, options, 1)
+            known = f"did you mean {near[0]!r}?" if near else f"known are {', '.join(options)}"
+            raise TypeError(f"unknown option {name!r}; {known}")
+    made = record(**given)
     return msgspec.structs.replace(made, **{n: options[n].checked(value) for n, value in given.items()})
 
 

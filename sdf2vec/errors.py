@@ -3,3 +3,7 @@
 
 class Sdf2vecError(ValueError):
     """Bad input or a failed write. The message is one line, fit to be shown to a user as it is."""
+
+
+class Sdf2vecWarning(RuntimeWarning):
+    """What a user should know, though the work goes on. The message is one line."""

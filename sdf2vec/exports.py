@@ -26,6 +26,7 @@ class Exports:
         """One export. Raises Sdf2vecError for an unknown target and for what the exporter can't do."""
         check_choice("target", target, EXPORTERS)
         exporter, options = EXPORTERS[target], options or Options()
+        exporter.check_count(self.scene.shape_count, options)
         refusal = exporter.accepts(options).refusal(self.scene)
         if not refusal:
             return exporter.write(self.scene, options)

@@ -3,11 +3,20 @@
 from __future__ import annotations
 
 import contextlib
+import hashlib
 import os
+import platform
 import secrets
+import time
+from functools import cache
 from pathlib import Path
 
 from sdf2vec.errors import Sdf2vecError
+
+_DAY = 86_400  # seconds
+_OURS = (
+    f".sdf2vec-{hashlib.sha256(platform.node().encode()).hexdigest()[:8]}-"  # this machine's temporary files
+)
 
 _REFUSALS: dict[type[OSError], str] = {
     FileNotFoundError: "no such folder",
@@ -24,7 +33,8 @@ def write_atomically(path: str | os.PathLike[str], data: bytes) -> None:
     The bytes go to a new file in the same folder, which is then renamed over `path`; on failure that new
     file is removed. Missing parent folders are created. Permissions are those of any newly created file
     (0666 less the umask), a symbolic link keeps pointing where it did, and a device or pipe is written to
-    directly, because replacing it by a file is never what was asked for.
+    directly, because replacing it by a file is never what was asked for. Temporary files of runs that were killed
+    are removed from the folder.
 
     Raises Sdf2vecError when the folder cannot be written to, `path` is a folder, the disk is full, and so on.
     """
@@ -40,7 +50,7 @@ def write_atomically(path: str | os.PathLike[str], data: bytes) -> None:
 
 
 def require_writable(path: str | os.PathLike[str]) -> None:
-    """Raises Sdf2vecError where `write_atomically` is bound to fail: before hours of work, say. Writes nothing."""
+    """Raises Sdf2vecError where `write_atomically` is bound to fail: before hours of work. Leaves nothing behind."""
     try:
         target = Path(os.path.realpath(path))
         if target.is_dir():
@@ -57,8 +67,30 @@ def _require_folder(folder: Path) -> None:
         folder = folder.parent
     if not folder.is_dir():
         raise NotADirectoryError
-    if not os.access(folder, os.W_OK | os.X_OK):
-        raise PermissionError
+    _write_and_remove(folder)
+
+
+def _write_and_remove(folder: Path) -> None:
+    """Tries it: what a folder's mode says is not true of every user and every file system."""
+    tried = folder / _temporary_name()
+    try:
+        tried.touch(exist_ok=False)
+    finally:
+        with contextlib.suppress(OSError):
+            tried.unlink()
+
+
+def _temporary_name() -> str:
+    return f"{_OURS}{os.getpid()}-{secrets.token_hex(8)}.tmp"
+
+
+def shown_as(data: bytes) -> str:
+    """What a browser shows a still picture's file as: png, jpeg, webp. Nothing for any other, and for a moving one."""
+    if data.startswith(b"\x89PNG"):
+        return "" if b"acTL" in data[:4096] else "png"
+    if data[:4] == b"RIFF" and data[8:12] == b"WEBP":
+        return "" if b"ANIM" in data[:64] else "webp"
+    return "jpeg" if data.startswith(b"\xff\xd8\xff") else ""
 
 
 def one_line(text: str) -> str:
@@ -67,7 +99,8 @@ def one_line(text: str) -> str:
 
 
 def _write_and_rename(target: Path, data: bytes) -> None:
-    beside = target.parent / f".sdf2vec-{secrets.token_hex(8)}.tmp"
+    _sweep(target.parent)
+    beside = target.parent / _temporary_name()
     try:
         with open(beside, "xb") as stream:
             stream.write(data)
@@ -77,6 +110,25 @@ def _write_and_rename(target: Path, data: bytes) -> None:
     finally:
         with contextlib.suppress(FileNotFoundError):
             beside.unlink()
+
+
+@cache
+def _sweep(folder: Path) -> None:
+    """Removes what runs that were killed have left beside their outputs."""
+    for path in folder.glob(".sdf2vec-*.tmp"):
+        with contextlib.suppress(OSError, ValueError):
+            if _is_left(path):
+                path.unlink()
+
+
+def _is_left(path: Path) -> bool:
+    """Whether its process has ended; on another machine: whether it is a day old."""
+    if path.name.startswith(_OURS) and os.name == "posix":
+        try:
+            os.kill(int(path.name.removeprefix(_OURS).split("-")[0]), 0)
+        except ProcessLookupError:
+            return True
+    return time.time() - path.stat().st_mtime > _DAY
 
 
 def _refusal(path: str | os.PathLike[str], error: Exception) -> Sdf2vecError:

@@ -9,34 +9,46 @@ from __future__ import annotations
 import functools
 import io
 import os
-import threading
-import warnings
-from collections.abc import Iterator
-from contextlib import contextmanager
+from collections.abc import Callable
+from contextlib import closing
 from dataclasses import dataclass
 from typing import Any, BinaryIO
 
 import numpy as np
 from numpy.typing import NDArray
-from PIL import Image, ImageChops, ImageCms, ImageOps
+from PIL import ExifTags, Image, ImageChops, ImageCms, PngImagePlugin
 
 from sdf2vec.errors import Sdf2vecError
 from sdf2vec.files import one_line
 
 from .arrays import Float32Array
-
-MAX_PIXELS = 200_000_000
-"""Pictures with more pixels than this are refused before they are decoded."""
-
-# Pillow reads more formats than these, some by starting other programs (EPS), so the list is closed.
-_FORMATS = ("PNG", "JPEG", "WEBP", "AVIF", "TIFF", "GIF", "BMP")
-_READABLE = "PNG, JPEG, WebP, AVIF, TIFF, GIF, BMP"
+from .decoding import (
+    check_file,
+    check_size,
+    decode,
+    frame_notes,
+    opened_image,
+    quiet_pillow,
+    read_all,
+    shrinking,
+)
+from .limits import CANVAS_SIDE, FITTED
 
 _FULL_SCALE = {"bool": 1, "uint8": 255, "uint16": 65535}
 _RANGE_SLACK = 0.01  # resampling overshoots 0..1 by a little; more than this is another scale
 
 _COLOUR_MODES = {"1": "L", "L": "L", "LA": "L", "CMYK": "CMYK", "I": "I", "F": "F"}  # any other mode: RGB
 _STRAIGHT_MODES = {"La": "LA", "RGBa": "RGBA"}  # Pillow's premultiplied modes
+_STRIP = 1 << 24  # pixels that are reduced at a time
+_TURNS = {
+    2: Image.Transpose.FLIP_LEFT_RIGHT,
+    3: Image.Transpose.ROTATE_180,
+    4: Image.Transpose.FLIP_TOP_BOTTOM,
+    5: Image.Transpose.TRANSPOSE,
+    6: Image.Transpose.ROTATE_270,
+    7: Image.Transpose.TRANSVERSE,
+    8: Image.Transpose.ROTATE_90,
+}  # by EXIF's orientation
 _CHANNELS = {1: [0, 0, 0], 2: [0, 0, 0, 1], 3: [0, 1, 2], 4: [0, 1, 2, 3]}  # grey, grey + alpha, RGB, RGBA
 
 
@@ -79,11 +91,12 @@ def load(source: Any) -> Picture:
     Arrays: [H, W], [H, W, 1] grey, [H, W, 2] grey and straight alpha, [H, W, 3] RGB, [H, W, 4] straight RGBA;
     bool, uint8, uint16, or floats 0..1. The array is copied.
 
-    Raises Sdf2vecError for anything that is no such picture, and for more than MAX_PIXELS pixels.
+    A file of more than `limits.FITTED` pixels is read at a half, a third and so on of its size. Raises
+    Sdf2vecError for anything that is no such picture, and for more than `limits.PIXELS` pixels.
     """
     name = one_line(str(getattr(source, "name", "picture")))
     try:
-        stream = io.BytesIO(source.read())
+        stream = read_all(source, name)
     except AttributeError as error:
         raise Sdf2vecError(
             f"cannot read a picture from {type(source).__name__}; "
@@ -114,14 +127,16 @@ def _(source: str | os.PathLike[str]) -> Picture:
     path = os.fsdecode(source)
     name = one_line(path)
     with _opened_file(path, name) as stream:
+        check_file(stream, name)
         # A pipe cannot be wound back, which naming what is wrong with it needs.
-        return _load_stream(stream if stream.seekable() else io.BytesIO(stream.read()), name)
+        return _load_stream(stream if stream.seekable() else read_all(stream, name), name)
 
 
 @load.register(Image.Image)
 def _(source: Image.Image) -> Picture:
-    with _quiet_pillow():
-        return _from_image(source, one_line(os.path.basename(getattr(source, "filename", "")) or "picture"))
+    name = one_line(os.path.basename(getattr(source, "filename", "")) or "picture")
+    with quiet_pillow():
+        return _picture(_parts(source, name), name)
 
 
 @load.register(np.ndarray)
@@ -130,7 +145,7 @@ def _(source: NDArray[Any]) -> Picture:
     if values.ndim != 3 or values.shape[2] not in _CHANNELS:
         shape = " × ".join(map(str, source.shape))
         raise Sdf2vecError(f"array: shape {shape}; a picture is [H, W] or [H, W, C] with C = 1, 2, 3 or 4")
-    _check_size(values.shape[1], values.shape[0], "array")
+    check_size(values.shape[1], values.shape[0], "array")
     return Picture(_without_opaque_alpha(_unit(values, "array")[..., _CHANNELS[values.shape[2]]]))
 
 
@@ -147,104 +162,114 @@ def _opened_file(path: str, name: str) -> BinaryIO:
         raise Sdf2vecError(f"{name}: cannot be read ({getattr(error, 'strerror', None) or error})") from error
 
 
-_pillow_lock = threading.RLock()
-
-
-@contextmanager
-def _quiet_pillow() -> Iterator[None]:
-    """Pillow without its warnings and its own size limit, in place of which `_check_size` stands."""
-    with _pillow_lock, warnings.catch_warnings():
-        warnings.simplefilter("ignore")
-        limit = Image.MAX_IMAGE_PIXELS
-        Image.MAX_IMAGE_PIXELS = None
-        try:
-            yield
-        finally:
-            Image.MAX_IMAGE_PIXELS = limit
-
-
 def _load_stream(stream: BinaryIO, name: str) -> Picture:
-    with _quiet_pillow(), _opened_image(stream, name) as image:
-        return _from_image(image, name)
-
-
-def _opened_image(stream: BinaryIO, name: str) -> Image.Image:
-    """The picture with its header read. Pillow's parsers raise nearly every exception on damaged files."""
     try:
-        return Image.open(stream, formats=_FORMATS)
-    except Exception as error:
-        raise Sdf2vecError(f"{name}: {_not_opened(stream)}") from error
+        with quiet_pillow():
+            with closing(opened_image(stream, name)) as image:  # closed, so that its pixels are let go of
+                parts = _parts(image, name)
+            return _picture(parts, name)
+    except MemoryError as error:
+        raise Sdf2vecError(f"{name}: its pixels do not fit in memory; shrink it first") from error
 
 
-def _not_opened(stream: BinaryIO) -> str:
-    stream.seek(0)
-    start = stream.read(16)
-    if not start:
-        return "empty file (0 bytes); re-save or re-download it"
-    if any(accepts(start) for _, accepts in map(Image.OPEN.__getitem__, _FORMATS) if accepts):
-        return "truncated or damaged file (its header cannot be read); re-save or re-download it"
-    return f"not a picture that can be read; give one of {_READABLE}"
+@dataclass(frozen=True, eq=False)
+class _Parts:
+    """A decoded picture, upright and small enough."""
+
+    colour: Image.Image  # mode L, I;16, I, F, RGB, CMYK
+    alpha: Image.Image | None  # mode L
+    profile: bytes | None
+    notes: tuple[str, ...]
 
 
-def _from_image(image: Image.Image, name: str) -> Picture:
-    _check_size(image.width, image.height, name)
-    upright = _upright(_decoded(image, name))
-    colour, alpha = _split_alpha(upright)
-    colour, colour_notes = _in_srgb(colour, upright.info.get("icc_profile"))
+def _parts(image: Image.Image, name: str) -> _Parts:
+    width, height = image.size
+    decode(image, name)
+    try:
+        factor = shrinking(*image.size)
+        colour, alpha = _split_alpha(image) if factor == 1 else _reduced(image, factor)
+        turned = _turn(image)
+        small = () if colour.size == (width, height) else (_shrunk_note(width, height, colour),)
+        if turned is not None:
+            colour, alpha = colour.transpose(turned), alpha.transpose(turned) if alpha else None
+        return _Parts(colour, alpha, image.info.get("icc_profile"), (*frame_notes(image), *small))
+    except (ValueError, OSError, KeyError, IndexError, SystemError) as error:  # a damaged palette, say
+        raise Sdf2vecError(
+            f"{name}: damaged file ({one_line(str(error))}); re-save or re-download it"
+        ) from error
+
+
+def _shrunk_note(width: int, height: int, colour: Image.Image) -> str:
+    limits = f"at most {FITTED.number} megapixels ({FITTED.variable}) and {CANVAS_SIDE} a side"
+    return f"{width} × {height} pixels are read as {colour.width} × {colour.height}: {limits}"
+
+
+def _picture(parts: _Parts, name: str) -> Picture:
+    colour, colour_notes = _in_srgb(parts.colour, parts.profile)
     values, scale_notes = _samples(colour, name)
     pixels = _unit(values, name)[..., _CHANNELS[values.shape[2]]]
-    if alpha is not None:
-        pixels = np.concatenate([pixels, np.asarray(alpha, np.float32)[..., np.newaxis] / 255], axis=2)
-    notes = (*_frame_notes(image), *colour_notes, *scale_notes)
+    if parts.alpha is not None:
+        pixels = np.concatenate([pixels, np.asarray(parts.alpha, np.float32)[..., np.newaxis] / 255], axis=2)
+    notes = (*parts.notes, *colour_notes, *scale_notes)
     return Picture(_without_opaque_alpha(pixels), tuple(f"{name}: {note}" for note in notes))
 
 
-def _check_size(width: int, height: int, name: str) -> None:
-    if min(width, height) < 1:
-        raise Sdf2vecError(f"{name}: has no pixels ({width} × {height})")
-    if width * height > MAX_PIXELS:
-        limit = MAX_PIXELS // 10**6
-        raise Sdf2vecError(f"{name}: {width} × {height} is more than {limit} megapixels; shrink it first")
-
-
-def _decoded(image: Image.Image, name: str) -> Image.Image:
+def _turn(image: Image.Image) -> Image.Transpose | None:
+    """What makes a picture upright."""
     try:
-        image.load()
-    except MemoryError as error:
-        raise Sdf2vecError(f"{name}: {image.width} × {image.height} pixels do not fit in memory") from error
-    except Exception as error:  # see `_opened_image`
-        reason = one_line(str(error))
-        kind = "truncated" if "truncated" in reason.lower() else "damaged"
-        raise Sdf2vecError(f"{name}: {kind} file ({reason}); re-save or re-download it") from error
-    return image
-
-
-def _upright(image: Image.Image) -> Image.Image:
-    try:
-        return ImageOps.exif_transpose(image)
+        return _TURNS.get(image.getexif().get(ExifTags.Base.Orientation, 1))
     except Exception:  # damaged EXIF data says nothing about the pixels
-        return image
+        return None
 
 
-def _frame_notes(image: Image.Image) -> tuple[str, ...]:
-    if not getattr(image, "is_animated", False):
-        return ()
-    try:
-        return (f"{getattr(image, 'n_frames', 1)} frames, first one used",)
-    except Exception:  # counting reads later frames, which may be damaged where the first is not
-        return ("several frames, first one used",)
+def _reduced(image: Image.Image, factor: int) -> tuple[Image.Image, Image.Image | None]:
+    """What `_split_alpha` gives, each pixel the mean of so many across and down; made strip by strip."""
+    width, height = image.size
+    size = -(-width // factor), -(-height // factor)
+    rows = factor * max(1, _STRIP // (width * factor))
+    whole: list[Image.Image] = []
+    for top in range(0, height, rows):
+        strip = image.crop((0, top, width, min(top + rows, height)))
+        parts = [part for part in _reduced_strip(*_split_alpha(strip), factor) if part is not None]
+        whole = whole or [Image.new(part.mode, size) for part in parts]
+        for into, part in zip(whole, parts, strict=True):
+            into.paste(part, (0, top // factor))
+    return whole[0], whole[1] if len(whole) == 2 else None
+
+
+def _reduced_strip(
+    colour: Image.Image, alpha: Image.Image | None, factor: int
+) -> tuple[Image.Image, Image.Image | None]:
+    if colour.mode.startswith("I;16"):  # which Pillow does not reduce
+        wide = Image.fromarray(np.asarray(colour).astype(np.int32)).reduce(factor)
+        colour = Image.fromarray(np.asarray(wide).astype(np.uint16))
+        return colour, alpha and alpha.reduce(factor)
+    if alpha is None:
+        return colour.reduce(factor), None
+    colour.putalpha(alpha)
+    both = colour.reduce(factor)  # premultiplied meanwhile
+    return both.convert(both.mode[:-1]), both.getchannel("A")
 
 
 def _split_alpha(image: Image.Image) -> tuple[Image.Image, Image.Image | None]:
-    """Colour in one of the modes L, I;16, I, F, RGB, CMYK, and alpha in mode L where there is any."""
+    """Colour in one of the modes L, I;16, I, F, RGB, CMYK, and alpha in mode L where there is any; both new."""
     if image.mode.startswith("I;16"):
-        return image, _keyed_alpha(image)
+        return image.copy(), _keyed_alpha(image)
+    image = _with_whole_palette(image)
     image = image.convert(_STRAIGHT_MODES.get(image.mode, image.mode))
     mode = _COLOUR_MODES.get(image.mode, "RGB")
     if mode not in ("L", "RGB") or not image.has_transparency_data:
         return image.convert(mode), None
     with_alpha = _with_eight_bit_key(image).convert(mode + "A")
     return with_alpha.convert(mode), with_alpha.getchannel("A")
+
+
+def _with_whole_palette(image: Image.Image) -> Image.Image:
+    """A palette has 256 colours at most; a PNG may give more alphas, which Pillow does not take."""
+    alphas = image.info.get("transparency")
+    if image.mode == "P" and isinstance(alphas, bytes) and len(alphas) > 256:
+        image.info["transparency"] = alphas[:256]
+    return image
 
 
 def _keyed_alpha(image: Image.Image) -> Image.Image | None:
@@ -390,9 +415,35 @@ def encode_png(pixels: NDArray[np.floating[Any]]) -> bytes:
 
     Raises Sdf2vecError for NaN.
     """
+    return encode(pixels, "PNG")
+
+
+def encode(pixels: NDArray[np.floating[Any]], form: str, made_by: str = "") -> bytes:
+    """The same in one of the formats PNG, JPEG (without alpha) and WEBP, whose metadata says what made it."""
     if np.isnan(pixels).any():
         raise Sdf2vecError("the picture to write holds NaN")
     levels = np.rint(np.clip(pixels, 0, 1) * 255).astype(np.uint8)
     stream = io.BytesIO()
-    Image.fromarray(levels).save(stream, "PNG")
+    Image.fromarray(levels).save(stream, form, **_SAVED[form](made_by))
     return stream.getvalue()
+
+
+def _png_text(made_by: str) -> dict[str, Any]:
+    text = PngImagePlugin.PngInfo()
+    if made_by:
+        text.add_text("Software", made_by)
+    return {"pnginfo": text}
+
+
+def _exif(made_by: str) -> Image.Exif:
+    exif = Image.Exif()
+    if made_by:
+        exif[ExifTags.Base.Software] = made_by
+    return exif
+
+
+_SAVED: dict[str, Callable[[str], dict[str, Any]]] = {
+    "PNG": _png_text,
+    "JPEG": lambda made_by: {"quality": 92, "subsampling": 0, "comment": made_by},
+    "WEBP": lambda made_by: {"quality": 92, "method": 4, "exif": _exif(made_by)},
+}

@@ -11,7 +11,6 @@ from __future__ import annotations
 
 import hashlib
 import importlib.util
-import os
 import pickle
 import sys
 import warnings
@@ -26,13 +25,13 @@ from typing import Any
 import llvmlite
 import numba
 import numpy as np
-import platformdirs
 from llvmlite import ir
 from numba import types
 from numba.core import caching, ccallback, compiler, serialize
 from numba.extending import intrinsic
 
-from .errors import Sdf2vecError
+from .cached import cache_folder, read_kept, trim
+from .errors import Sdf2vecError, Sdf2vecWarning
 from .files import write_atomically
 
 FLAGS: dict[str, Any] = {
@@ -136,11 +135,6 @@ def is_compiled(dispatcher: Any) -> bool:
     return any(cache_folder().glob(f"{_stem(dispatcher.py_func)}-*"))
 
 
-def cache_folder() -> Path:
-    """`$SDF2VEC_CACHE`, or the user's cache folder as the system has it."""
-    return Path(os.environ.get("SDF2VEC_CACHE") or platformdirs.user_cache_path("sdf2vec", appauthor=False))
-
-
 class _Kept(caching.NullCache):
     """The machine code of one kernel, a file for each signature: a digest, then what numba makes of it."""
 
@@ -152,11 +146,11 @@ class _Kept(caching.NullCache):
         name is another now: a remark in generated text is enough for that."""
         target.refresh()
         try:
-            data = self._path(signature, target.codegen()).read_bytes()
+            data = read_kept(self._path(signature, target.codegen()))
             if hashlib.sha256(data[DIGEST:]).digest() != data[:DIGEST]:
                 return None
             return compiler.CompileResult._rebuild(target, *pickle.loads(data[DIGEST:]))
-        except (OSError, ImportError):
+        except Exception:  # whatever it is, compiling mends it
             return None
 
     def save_overload(self, signature: object, compiled: Any) -> None:
@@ -165,6 +159,7 @@ class _Kept(caching.NullCache):
         try:
             path = self._path(signature, compiled.codegen)
             write_atomically(path, hashlib.sha256(data).digest() + data)
+            trim()
         except (Sdf2vecError, OSError):
             _warn_once(cache_folder())
 
@@ -205,5 +200,7 @@ def _temporary_folder() -> TemporaryDirectory[str]:
 @cache
 def _warn_once(folder: Path) -> None:
     warnings.warn(
-        f"cannot write to {folder}: kernels are compiled anew in every run", RuntimeWarning, stacklevel=4
+        f"cannot write to {folder}: kernels are compiled anew in every run; SDF2VEC_CACHE names another folder",
+        Sdf2vecWarning,
+        stacklevel=4,
     )

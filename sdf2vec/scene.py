@@ -9,7 +9,7 @@ from __future__ import annotations
 import math
 import re
 import reprlib
-from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import lru_cache
@@ -22,6 +22,7 @@ from msgspec import Meta
 from .blend import COMPOSITING, JOINS, OVER, UNION
 from .errors import Sdf2vecError
 from .layer import JOIN, LOOK, Part, Structure
+from .limits import CANVAS_SIDE
 from .paints import BASE, FLAT, PAINTS
 from .shapes import KINDS
 from .units import BACKGROUND, COLOR, Parameter
@@ -29,7 +30,7 @@ from .units import BACKGROUND, COLOR, Parameter
 MAX_SHAPES = 65536
 MAX_JOINED = 128  # shapes in one layer: each is a term of one formula
 
-Side = Annotated[int, Meta(ge=1, le=65536)]  # pixels
+Side = Annotated[int, Meta(ge=1, le=CANVAS_SIDE)]  # pixels
 Joined = Annotated[list[Any], Meta(min_length=1, max_length=MAX_JOINED)]
 Color = tuple[float, float, float]
 Value = float | tuple[float, ...]  # of a parameter
@@ -157,6 +158,10 @@ def named(parameters: Iterable[Parameter], row: Iterable[float]) -> dict[str, Va
     """Values by name from the numbers that come next in a row."""
     rest = iter(row)
     return {p.name: p.values_from([next(rest) for _ in range(p.width)]) for p in parameters}
+
+
+# What a notebook can show of a scene, by media type: `api` says it, since a scene knows nothing of rendering.
+SHOWN: dict[str, Callable[[Scene], str]] = {}
 
 
 # --- the scene ---------------------------------------------------------------------------------------------
@@ -350,6 +355,21 @@ class Scene:
         if not COMPOSITING[self.compositing].signed:
             for index, layer in enumerate(self.layers):
                 _refuse_signs(layer, f"layers[{index}]")
+
+    def __repr__(self) -> str:
+        kinds = dict.fromkeys(shape.kind for layer in self.layers for shape in layer.shapes)
+        told = f"{self.shape_count} shapes in {len(self.layers)} layers" + (
+            f": {', '.join(kinds)}" if kinds else ""
+        )
+        ground = "" if self.background else ", transparent"
+        return f"<Scene {self.width} × {self.height}, {told}; {self.compositing}{ground}>"
+
+    def _repr_mimebundle_(
+        self, include: Collection[str] | None = None, exclude: Collection[str] | None = None
+    ) -> dict[str, str]:
+        """What a notebook shows: the first of `SHOWN`, which is quick, unless others are asked for."""
+        asked = list(SHOWN)[:1] if include is None else [kind for kind in SHOWN if kind in include]
+        return {kind: SHOWN[kind](self) for kind in asked if kind not in (exclude or ())}
 
     @property
     def shape_count(self) -> int:

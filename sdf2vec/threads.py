@@ -11,6 +11,8 @@ from typing import Any, TypeVar
 
 import torch
 
+from .limits import THREADS, whole_number
+
 T = TypeVar("T")
 R = TypeVar("R")
 
@@ -38,9 +40,11 @@ def in_threads_each(function: Callable[[T], R], items: Iterable[T]) -> list[R]:
 
 
 def threads() -> int:
-    """How many threads there are: `$SDF2VEC_THREADS`, or one for each core that this process may use."""
-    asked = os.environ.get("SDF2VEC_THREADS", "")
-    return max(1, int(asked)) if asked.isdigit() else available_cores()
+    """How many threads there are: `$SDF2VEC_THREADS`, or one for each core that this process may use.
+
+    Raises Sdf2vecError where that is no number of threads.
+    """
+    return whole_number("SDF2VEC_THREADS", available_cores(), THREADS)
 
 
 @cache

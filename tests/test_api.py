@@ -1,9 +1,11 @@
 """The public functions, in the words of the command line."""
 
+import base64
 import io
 import subprocess
 import sys
 from dataclasses import replace
+from importlib.resources import files
 from types import FunctionType
 from typing import TYPE_CHECKING
 
@@ -203,7 +205,7 @@ def test_an_export_is_text_or_bytes(target):
     scene = red_circle()
     data = sdf2vec.export(scene, target)
     assert data == sdf2vec.export(sdf2vec.loads(sdf2vec.dumps(scene)), target)
-    assert isinstance(data, bytes if target in ("png", "pdf") else str)
+    assert isinstance(data, bytes if target in ("png", "jpg", "webp", "pdf") else str)
 
 
 def test_export_options_have_the_words_of_the_command_line():
@@ -296,6 +298,57 @@ def test_a_mixture_is_fitted(levels):
     mixture = fit(levels, loss="l1:0.5,flip:0.5")
     assert mixture == fit(levels, loss=[("l1", 0.5), ("flip", 0.5)])
     assert mixture != fit(levels, loss="l1")
+
+
+def test_a_wrong_keyword_is_named_with_the_nearest_right_one(levels):
+    with pytest.raises(TypeError, match="unknown option 'compositting'; did you mean 'compositing'"):
+        fit(levels, compositting="over")
+    with pytest.raises(TypeError, match="unknown option 'zzz'; known are shapes, kind"):
+        fit(levels, zzz=1)
+    with pytest.raises(TypeError, match="unknown option 'framming'; did you mean 'framing'"):
+        sdf2vec.export(red_circle(), "glsl", framming="fit")
+
+
+@pytest.mark.parametrize(
+    ("given", "shape"),
+    [
+        ({"width": 12}, (8, 12)),
+        ({"height": 4}, (4, 6)),
+        ({"width": 1}, (1, 1)),
+        ({}, (16, 24)),
+        ({"width": 5, "height": 9}, (9, 5)),
+    ],
+)
+def test_a_render_of_one_side_keeps_the_proportions(given, shape):
+    assert sdf2vec.render(red_circle(), **given).shape[:2] == shape
+
+
+def test_a_notebook_shows_a_scene():
+    """As the notebook's own formatter asks for it."""
+    scene = red_circle()
+    bundle = scene._repr_mimebundle_(include=None, exclude=None)
+    assert list(bundle) == ["image/png"]
+    with Image.open(io.BytesIO(base64.b64decode(bundle["image/png"]))) as image:
+        assert image.size == (24, 16)
+    drawing = scene._repr_mimebundle_(include={"image/svg+xml"})
+    assert drawing == {"image/svg+xml": sdf2vec.export(scene, "svg")}
+    assert scene._repr_mimebundle_(exclude={"image/png"}) == {}
+    wide = Scene(4000, 2000, scene.layers)
+    with Image.open(io.BytesIO(base64.b64decode(wide._repr_mimebundle_()["image/png"]))) as image:
+        assert image.size == (1024, 512)
+
+
+def test_the_text_of_a_scene_is_short():
+    layers = red_circle().layers * 300
+    assert (
+        repr(Scene(24, 16, layers, None))
+        == "<Scene 24 × 16, 300 shapes in 300 layers: circle; over, transparent>"
+    )
+    assert repr(Scene(24, 16, ())) == "<Scene 24 × 16, 0 shapes in 0 layers; over>"
+
+
+def test_the_package_is_typed():
+    assert files("sdf2vec").joinpath("py.typed").is_file()
 
 
 def test_functions_stay_functions():

@@ -232,7 +232,7 @@ def test_it_is_packed_within_the_error(monkeypatch, require_engine):
     require_engine("opengl")
     monkeypatch.setattr(packing, "SAMPLE", 1 << 17)
     scene = toy_scene()
-    made = exported(scene, "shadertoy", layout="packed")
+    made = exported(scene, "shadertoy", layout="packed", framing="fit")
     assert 0.0 < made.error <= packing.LIMIT
     result = compare(ROUND_TRIPS["shadertoy"][0], made, scene, (101, 67))
     assert result.largest_error <= packing.LIMIT + 0.05

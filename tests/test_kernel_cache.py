@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from sdf2vec import kernel_cache
+from sdf2vec.cached import cache_folder, files, trim
 from sdf2vec.layer import Part
 from sdf2vec.render import kernels
 
@@ -72,16 +73,47 @@ def test_without_a_cache_folder_kernels_work_with_one_warning(tmp_path):
     (tmp_path / "file").write_text("not a folder")
     result = run(RUN, tmp_path / "file" / "inside")
     assert result.stdout.split() == ["2", "3", "False", "False", "0"]
-    assert result.stderr.count("RuntimeWarning") == 1
+    assert result.stderr.count("Sdf2vecWarning") == 1
     assert "compiled anew in every run" in result.stderr
+
+
+def test_machine_code_that_others_may_have_written_is_compiled_anew(tmp_path):
+    first = run(RUN, tmp_path).stdout
+    for path in tmp_path.glob("*.kernel"):
+        path.chmod(0o666)
+    assert run(RUN, tmp_path).stdout.split()[-1] == "0"
+    assert run(RUN, tmp_path).stdout.split()[-1] == "1"  # written anew, with other permissions
+    assert first.split()[:2] == ["2", "3"]
+
+
+def test_the_folder_does_not_grow_without_bound(tmp_path, monkeypatch):
+    monkeypatch.setenv("SDF2VEC_CACHE", str(tmp_path))
+    names = ["old.kernel", "middle.kernel", "kernels_new.py", "of another.txt"]
+    for age, name in enumerate(reversed(names)):
+        (tmp_path / name).write_bytes(bytes(600_000))
+        os.utime(tmp_path / name, (1e9 - age, 1e9 - age))
+    assert [path.name for path, _ in files()] == names[:3]
+    monkeypatch.setenv("SDF2VEC_CACHE_MEGABYTES", "1")
+    assert trim() == 2
+    assert sorted(os.listdir(tmp_path)) == ["kernels_new.py", "of another.txt"]
+    assert trim() == 0
+
+
+def test_saving_a_kernel_trims_the_folder(tmp_path, monkeypatch):
+    (tmp_path / "old.kernel").write_bytes(bytes(2_000_000))
+    os.utime(tmp_path / "old.kernel", (1e9, 1e9))
+    monkeypatch.setenv("SDF2VEC_CACHE_MEGABYTES", "1")
+    run(RUN, tmp_path)
+    assert not (tmp_path / "old.kernel").exists()
+    assert len(list(tmp_path.glob("*.kernel"))) == 2
 
 
 def test_the_folder_is_the_users_unless_another_is_named(monkeypatch):
     monkeypatch.setenv("SDF2VEC_CACHE", "/elsewhere")
-    assert str(kernel_cache.cache_folder()) == "/elsewhere"
+    assert str(cache_folder()) == "/elsewhere"
     monkeypatch.delenv("SDF2VEC_CACHE")
     monkeypatch.setenv("XDG_CACHE_HOME", "/its/cache")
-    assert sys.platform != "linux" or str(kernel_cache.cache_folder()) == "/its/cache/sdf2vec"
+    assert sys.platform != "linux" or str(cache_folder()) == "/its/cache/sdf2vec"
 
 
 # --- fingerprints -------------------------------------------------------------------------------------------

@@ -70,7 +70,7 @@ def test_wheel_holds_the_package_and_its_templates(wheel):
     assert expected
     assert expected <= names
     assert "sdf2vec/__init__.py" in names
-    assert {name.split("/")[0].split("-")[0] for name in names} == {"sdf2vec"}
+    assert {name.split("/")[0].split("-")[0] for name in names} == {"sdf2vec", "sdf2vec_start.py"}
     assert not any("test" in name for name in names)
 
 

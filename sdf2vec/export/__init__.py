@@ -7,8 +7,10 @@ from dataclasses import dataclass
 from functools import partial
 
 from ..deferred import deferred
-from ..scene import Scene
-from .exported import Exported
+from ..errors import Sdf2vecError
+from ..scene import MAX_SHAPES, Scene
+from ..scene_file import FORMAT
+from .exported import MARK, Exported
 from .options import Accepts, Options
 
 
@@ -16,49 +18,122 @@ from .options import Accepts, Options
 class Exporter:
     """`suffix` is what a file name gets in place of the picture's; `about` is one line for the user.
 
-    `accepts` says which scenes `write` takes.
+    `accepts` says which scenes `write` takes, `most_shapes` how many shapes they may have; `heeds` names the options
+    that matter to it; other files that it may write end in `beside`. A file that ends in one of `endings` is taken to
+    be for it; one that holds `mark` was made by it.
     """
 
     suffix: str
     write: Callable[[Scene, Options], Exported]
     about: str
     accepts: Callable[[Options], Accepts] = lambda options: Accepts()
+    heeds: tuple[str, ...] = ()
+    other_endings: tuple[str, ...] = ()
+    beside: tuple[str, ...] = ()
+    mark: bytes = MARK.encode()
+    most_shapes: Callable[[Options], int] = lambda options: MAX_SHAPES
+
+    @property
+    def endings(self) -> tuple[str, ...]:
+        """What its files may end in."""
+        return (self.suffix, *self.other_endings)
+
+    def check_count(self, count: int, options: Options) -> None:
+        """Raises Sdf2vecError for more shapes than the target can serve."""
+        most = self.most_shapes(options)
+        if count > most:
+            raise Sdf2vecError(
+                f"{self.suffix[1:]}: {count} shapes are more than its text can hold ({most}); "
+                "write glsl or wgsl to files, which hold data, or json, or fit fewer"
+            )
 
 
-def _shader(name: str, suffix: str, about: str) -> Exporter:
-    write = deferred("sdf2vec.export.shader", "exported")
-    return Exporter(suffix, partial(write, name=name, suffix=suffix), about)
+def _shader(
+    name: str,
+    suffix: str,
+    about: str,
+    heeds: tuple[str, ...] = (),
+    endings: tuple[str, ...] = (),
+    beside: tuple[str, ...] = (),
+) -> Exporter:
+    module = "sdf2vec.export.shader"
+    write, most_shapes = deferred(module, "exported"), deferred(module, "most_shapes")
+    return Exporter(
+        suffix,
+        partial(write, name=name, suffix=suffix),
+        about,
+        heeds=("layout", *heeds, "title"),
+        other_endings=endings,
+        beside=beside,
+        most_shapes=partial(most_shapes, name=name),
+    )
 
 
-def _svg(name: str, suffix: str, about: str) -> Exporter:
-    module = "sdf2vec.export.svg"
-    return Exporter(suffix, deferred(module, name), about, deferred(module, "accepts"))
+def _svg(name: str, suffix: str, about: str, endings: tuple[str, ...] = ()) -> Exporter:
+    module, heeds = "sdf2vec.export.svg", ("svg_profile", "svg_size_limit", "title", "alt")
+    accepts = deferred(module, "accepts")
+    return Exporter(suffix, deferred(module, name), about, accepts, heeds, endings)
+
+
+def _raster(name: str, about: str, *endings: str) -> Exporter:
+    suffix = f".render.{name}"
+    write = deferred("sdf2vec.export.raster", name)
+    return Exporter(suffix, write, about, heeds=("size",), other_endings=(f".{name}", *endings))
 
 
 EXPORTERS: dict[str, Exporter] = {
-    "glsl": _shader("glsl", ".glsl", "fragment shader, GLSL ES 3.00, ES 1.00 or 3.30"),
-    "shadertoy": _shader("shadertoy", ".shadertoy.glsl", "mainImage to paste into Shadertoy"),
-    "wgsl": _shader("wgsl", ".wgsl", "shader module for WebGPU"),
-    "three": _shader("three", ".three.js", "three.js material, an ES module"),
+    "glsl": _shader(
+        "glsl",
+        ".glsl",
+        "fragment shader, GLSL ES 3.00, ES 1.00 or 3.30",
+        ("glsl", "framing"),
+        (".frag",),
+        (".glsl.bin", ".glsl.data.js"),
+    ),
+    "shadertoy": _shader(
+        "shadertoy",
+        ".shadertoy.glsl",
+        "mainImage to paste into Shadertoy",
+        ("framing", "animate"),
+        (".glsl",),
+    ),
+    "wgsl": _shader(
+        "wgsl", ".wgsl", "shader module for WebGPU", ("framing",), (), (".wgsl.bin", ".wgsl.data.js")
+    ),
+    "three": _shader("three", ".three.js", "three.js material, an ES module", (), (".js",)),
     "godot": _shader("godot", ".gdshader", "canvas item shader for Godot 4"),
     "svg": _svg("svg", ".svg", "SVG that looks the same in every renderer"),
-    "data-uri": _svg("data_uri", ".uri.txt", "that SVG as a data URI"),
+    "data-uri": _svg("data_uri", ".uri.txt", "that SVG as a data URI", (".uri",)),
     "pdf": Exporter(
         ".pdf",
         deferred("sdf2vec.export.svg", "pdf"),
         "the portable SVG as PDF, by CairoSVG",
         lambda options: Accepts(("over",)),
+        ("svg_size_limit", "title"),
+        mark=b"/Producer (" + MARK.encode(),
     ),
     "html": Exporter(
         ".html",
         deferred("sdf2vec.export.page", "html"),
         "one page without dependencies: shader, drawing, copy buttons",
+        heeds=("title", "alt", "original"),
+        other_endings=(".htm",),
+        mark=b'<meta name="generator" content="sdf2vec">',
     ),
     "component": Exporter(
         ".sdf-image.js",
         deferred("sdf2vec.export.component", "component"),
         "<sdf-image>, an element that shows scene files",
+        other_endings=(".js",),
     ),
-    "json": Exporter(".scene.json", deferred("sdf2vec.export.raster", "json"), "the scene itself"),
-    "png": Exporter(".render.png", deferred("sdf2vec.export.raster", "png"), "the render, at any --size"),
+    "json": Exporter(
+        ".scene.json",
+        deferred("sdf2vec.export.raster", "json"),
+        "the scene itself",
+        other_endings=(".json",),
+        mark=f'"format": "{FORMAT}"'.encode(),
+    ),
+    "png": _raster("png", "the render, at any --size"),
+    "jpg": _raster("jpg", "the same as JPEG", ".jpeg"),
+    "webp": _raster("webp", "the same as WebP"),
 }

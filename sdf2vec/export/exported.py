@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 
+MARK = "Made with sdf2vec"  # what nearly every export says of itself: such files may be replaced
+
 
 @dataclass(frozen=True)
 class Exported:

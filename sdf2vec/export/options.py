@@ -16,7 +16,7 @@ LAYOUTS = ("auto", "readable", "table", "tiled", "packed", "data")
 SVG_PROFILES = ("filters", "portable")
 
 
-Size = Annotated[int, number("size in pixels", "PIXELS", 1, 16384, "shortest side of a PNG")]
+Size = Annotated[int, number("size in pixels", "PIXELS", 1, 16384, "shortest side of a PNG, JPEG or WebP")]
 SizeLimit = Annotated[
     int, number("SVG size limit in bytes", "BYTES", 1, None, "draw an SVG coarser where it would be larger")
 ]
@@ -28,15 +28,26 @@ class Options(Struct, frozen=True, kw_only=True):
     size: Size | None = None
     glsl: Annotated[str, choice("GLSL version", "version of the GLSL", GLSL_VERSIONS)] = "es300"
     layout: Annotated[str, choice("layout", "how shaders hold shapes", LAYOUTS)] = "auto"
-    framing: Annotated[str, choice("framing", "how shaders fill a canvas of another shape", FRAMINGS)] = "fit"
+    framing: (
+        Annotated[
+            str,
+            choice(
+                "framing",
+                "how shaders fill a canvas of another shape: crop for pasted ones, else fit",
+                FRAMINGS,
+            ),
+        ]
+        | None
+    ) = None
     animate: Annotated[bool, plain("the shapes of a Shadertoy breathe")] = False
     svg_profile: Annotated[
         str, choice("SVG profile", "with blur filters, or without, for every renderer", SVG_PROFILES)
     ] = SVG_PROFILES[0]
     svg_size_limit: SizeLimit | None = None
-    title: Annotated[str, plain("what an export calls the picture")] = "a picture"
+    title: Annotated[str, plain("what an export calls the picture (default: its name)", "TEXT")] = "a picture"
+    alt: Annotated[str, plain("what is in the picture, for who can't see an SVG or a page", "TEXT")] = ""
     alone: Annotated[bool, plain("no files beside the text")] = False
-    original: Annotated[bytes | None, plain("PNG or JPEG that a page compares with")] = None
+    original: Annotated[bytes | None, plain("PNG, JPEG or WebP that a page compares with")] = None
 
 
 @dataclass(frozen=True)

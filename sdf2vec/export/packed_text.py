@@ -13,16 +13,8 @@ from ..scene import Scene
 from ..shapes import KINDS
 from ..units import Parameter
 from .layouts import WORD
-from .packing import (
-    CELL_BITS,
-    CHOICE_BITS,
-    COUNT_BITS,
-    PLACE,
-    Layout,
-    by_precision,
-    decoded,
-    pack,
-)
+from .packed_bits import CELL_BITS, CHOICE_BITS, COUNT_BITS, PLACE, Layout, by_precision
+from .packing import decoded, pack
 from .records import Form, Variant, drawn_by, joined_by
 
 

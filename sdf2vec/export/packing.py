@@ -12,7 +12,7 @@ the same to every compiler.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import cache, partial
 
@@ -34,6 +34,17 @@ from ..shapes import KINDS
 from ..threads import threads_of_its_own
 from ..units import ANGLE, COLOR_DECIMALS, FREQUENCY, GEOMETRY_DECIMALS, Fractions, Parameter
 from .layouts import WORD
+from .packed_bits import (
+    AHEAD,
+    CELL_BITS,
+    CHOICE_BITS,
+    COUNT_BITS,
+    PLACE,
+    Layout,
+    Precision,
+    Stream,
+    by_precision,
+)
 from .records import Variant, first_records, joins_of, variant_of, variants_of
 from .tiles import Grid, layer_bounds
 
@@ -41,9 +52,6 @@ LIMIT = 0.95  # 8-bit levels: largest error of the picture; drawing adds less th
 CANVAS = (1920, 1080)  # pixels, for which the error is measured
 SAMPLE = 1 << 21  # shapes × pixels that are looked at where no kernels are worth compiling
 CELLS = 16  # along the longer side of the grid
-CELL_BITS = 4
-CHOICE_BITS = 3  # say how many more bits than the least a layer's fractions have
-COUNT_BITS = 7  # of the number of shapes in a layer
 LEAST_BITS, MOST_BITS = 4, 24  # of a fraction; a float holds no more
 FEWER = 5  # bits that all layers begin without, when the fewest are looked for
 ROUNDS = 60
@@ -51,8 +59,8 @@ BLAME = (
     0.97  # of the largest share that a layer has in what is off at a pixel: who has so much gets more bits
 )
 WORST = 4096  # pixels that are looked at in each round
+BLAMED = 1 << 20  # layers × pixels that are looked at at a time
 FAINT = 0.05  # opacity below which layers are not told apart
-PLACE = "place"  # the precision of what lies in a layer's box: bits by how sharp its edge is
 
 Limits = tuple[float, float]
 Ends = tuple[
@@ -60,19 +68,6 @@ Ends = tuple[
 ]  # of the components of a parameter: where its fractions are 0, and where 1
 
 CORNER, BOX = var("corner", VEC2), var("box", VEC2)
-
-
-@dataclass(frozen=True)
-class Precision:
-    """Bits of each field. `places` is how finely positions are said: −log2 of the step, in falloffs."""
-
-    places: float = 4.0
-    falloff: int = 8
-    color: int = 7
-    opacity: int = 7
-
-    def finer(self, field: str, steps: float = 1) -> Precision:
-        return replace(self, **{field: getattr(self, field) + steps})
 
 
 FIELDS = ("places", "falloff", "color", "opacity")
@@ -161,8 +156,11 @@ def _fewest_bits(
             return counts.tolist(), float(off.max())
         wrong = np.nonzero(off > limit)[0]
         worst = wrong[np.argsort(-off[wrong], kind="stable")[:WORST]]
+        before = counts.copy()
         counts[packer.to_blame(view, worst, counts)] += 1
         counts = np.minimum(counts, MOST_BITS)
+        if np.array_equal(counts, before):  # nobody can have more: no further round helps
+            return None
     return None
 
 
@@ -259,15 +257,17 @@ class _Packer:
 
     def to_blame(self, view: _View, chosen: IntArray, counts: IntArray) -> IntArray:
         """The layers whose coarse places can be why the picture is off at some pixels."""
-        cover = np.abs(view.coverages(self.scene, chosen))
         steep = np.array([self._steepness(*pair) for pair in zip(self.scene.layers, self.cells, strict=True)])
-        share = cover * (1.0 - cover) * (steep * 0.5**counts)[:, None]
-        guilty = (share >= BLAME * share.max(axis=0)) & (share > 0.0)
-        return np.nonzero(guilty.any(axis=1))[0]
+        heavy, guilty = (steep * 0.5**counts)[:, None], np.zeros(len(steep), bool)
+        for some in np.array_split(chosen, -(-len(chosen) * len(steep) // BLAMED)):
+            cover = np.abs(view.coverages(self.scene, some))
+            share = cover * (1.0 - cover) * heavy
+            guilty |= ((share >= BLAME * share.max(axis=0)) & (share > 0.0)).any(axis=1)
+        return np.nonzero(guilty)[0]
 
     def pack(self, precision: Precision, counts: Sequence[int], error: float) -> Packed:
         least = min(counts, default=1)
-        stream = _Stream()
+        stream = Stream()
         for layer, cells, count in zip(self.scene.layers, self.cells, counts, strict=True):
             for place in cells:
                 stream.put(place, CELL_BITS)
@@ -347,11 +347,6 @@ def _by_parameter(shape: Shape) -> dict[Parameter, list[float]]:
     return {parameter: [next(rest) for _ in range(parameter.width)] for parameter in declared}
 
 
-def by_precision(parameters: Iterable[Parameter]) -> list[Parameter]:
-    """Parameters in the order in which a packed shape has them: those of a precision of their own first."""
-    return sorted(parameters, key=lambda parameter: parameter.unit.codec.precision == PLACE)
-
-
 class _Coder:
     """Collects whole numbers with their bits, for one layer; each method returns the value that its number says."""
 
@@ -395,79 +390,6 @@ def _legal(value: float, parameter: Parameter) -> float:
     """What a scene takes: a length that must be positive may have become 0."""
     least = parameter.unit.low + (10.0**-GEOMETRY_DECIMALS if parameter.positive else 0.0)
     return min(max(value, least), parameter.unit.high)
-
-
-@dataclass(frozen=True)
-class Layout:
-    """Where the numbers of a packed layer are.
-
-    A layer is: its box of cells, bits more than the least, variant (or with joins: number of shapes), falloff,
-    opacity; then its shapes: (variant, join, smoothness,) colours, places. With joins all shapes of a layer are as
-    long as the longest could be.
-    """
-
-    variants: tuple[Variant, ...]
-    joins: tuple[str, ...]
-
-    @property
-    def variant_bits(self) -> int:
-        return (len(self.variants) - 1).bit_length() if self.variants else 0
-
-    @property
-    def join_bits(self) -> int:
-        return (len(self.joins) - 1).bit_length() if self.joins else 0
-
-    @property
-    def head(self) -> int:
-        """Bits before the falloff."""
-        return 4 * CELL_BITS + CHOICE_BITS + (COUNT_BITS if self.joins else self.variant_bits)
-
-    def before_shapes(self, precision: Precision) -> int:
-        """Bits before the first shape."""
-        return self.head + precision.falloff + precision.opacity
-
-    def before_numbers(self, precision: Precision) -> int:
-        """Bits of a shape before its colours."""
-        return self.variant_bits + self.join_bits + precision.falloff if self.joins else 0
-
-    def counts(self, variant: Variant) -> tuple[int, int]:
-        """How many fractions of a shape have the colours' precision, and how many that of places."""
-        parameters = (*PAINTS[variant.paint].parameters, *KINDS[variant.kind].parameters)
-        places = sum(p.width for p in parameters if p.unit.codec.precision == PLACE)
-        return sum(p.width for p in parameters) - places, places
-
-    def most(self) -> tuple[int, int]:
-        """The most of either that any variant has."""
-        counts = [self.counts(variant) for variant in self.variants]
-        return max((c for c, _ in counts), default=0), max((p for _, p in counts), default=1)
-
-    def longest(self, precision: Precision, count: int) -> int:
-        """Bits of the longest shape whose places have so many."""
-        colors, places = self.most()
-        return self.before_numbers(precision) + colors * precision.color + places * count
-
-
-class _Stream:
-    """Bits one after another, as words."""
-
-    def __init__(self) -> None:
-        self._value = 0
-        self.bits = 0
-
-    def put(self, value: int, bits: int) -> None:
-        assert 0 <= value < 1 << bits, f"{value} has more than {bits} bits"
-        self._value |= value << self.bits
-        self.bits += bits
-
-    def words(self, ahead: int) -> tuple[int, ...]:
-        """All words, and so many empty ones that a shader may read ahead."""
-        count = -(-self.bits // WORD) + ahead
-        raw = self._value
-        mask = (1 << WORD) - 1
-        return tuple((raw >> (WORD * i)) & mask for i in range(count))
-
-
-AHEAD = 4  # words that a shader may read beyond a shape
 
 
 def _cell_boxes(scene: Scene, slack: float) -> tuple[Grid, list[tuple[int, int, int, int]]]:

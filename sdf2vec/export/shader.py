@@ -10,15 +10,16 @@ from typing import Any
 import numpy as np
 
 from ..arrays import Float32Array, IntArray
-from ..blend import BREATH, COMPOSITING, FRAMINGS, breath, display, grid_point, surface_point
+from ..blend import BREATH, COMPOSITING, CROP, FRAMINGS, breath, cropped, display, grid_point, surface_point
 from ..deferred import deferred
 from ..errors import Sdf2vecError
 from ..expr import Expr, const, var, vec2, vec4
 from ..layer import STILL, Formula, P, constant_row
+from ..limits import TEXT_SHAPES
 from ..lower.shader import GLSL, WGSL, Dialect, definition, expression, literal, statements, used_functions
-from ..operation import VEC2
+from ..operation import VEC2, VEC4
 from ..paints import FLAT
-from ..scene import Layer, Scene
+from ..scene import MAX_SHAPES, Layer, Scene
 from ..templating import template
 from .exported import Exported
 from .layouts import (
@@ -38,6 +39,7 @@ from .records import BELOW, COUNT, JOIN, OWN, Form, first_records, form_of, reco
 from .tiles import COARSEST, Tiles
 
 packed_text: Callable[..., Any] = deferred("sdf2vec.export.packed_text", "PackedText")  # needs torch
+SEEN = var("{seen}", VEC4)  # where a template puts the colour that is seen
 DATA_WIDTH = 256  # texels in a row of a data texture
 
 
@@ -50,11 +52,12 @@ class Target:
     host: Host
     time: str = ""  # what holds the seconds, where shapes can move
     surface: str = ""  # what holds the place on a mesh, 0..1 with y down, where there is no canvas
+    framing: str = "fit"  # unless told
 
 
 TARGETS = {
     "glsl": Target("glsl.jinja", GLSL, FILE),
-    "shadertoy": Target("shadertoy.jinja", GLSL, PASTED, time="iTime"),
+    "shadertoy": Target("shadertoy.jinja", GLSL, PASTED, time="iTime", framing=CROP),
     "wgsl": Target("wgsl.jinja", WGSL, MODULE),
     "three": Target("three.js.jinja", GLSL, EMBEDDED, surface="place"),
     "godot": Target("godot.jinja", GLSL, OLD, surface="UV"),
@@ -107,6 +110,7 @@ def shader(scene: Scene, name: str, options: Options) -> Shader:
         version=GLSL_VERSIONS[options.glsl],
         output="gl_FragColor" if options.glsl == "es100" else "fragColor",
         display="" if job.is_displayable else "display",
+        cropped=job.say(cropped(SEEN, P, _size(scene), _background(scene))) if job.framing == CROP else "",
         place=expression(surface_point(var(target.surface, VEC2), _size(scene)), target.dialect),
         **(dict.fromkeys(("table", "packed", "tiles", "data")) | {"layers": []} | parts),
     )
@@ -128,6 +132,11 @@ def files_beside(made: Shader, suffix: str) -> dict[str, bytes]:
         data=base64.b64encode(raw).decode(), rows=len(made.data), width=DATA_WIDTH
     )
     return {f"{suffix}.bin": raw, f"{suffix}.data.js": module.encode()}
+
+
+def most_shapes(options: Options, name: str) -> int:
+    """How many shapes a target can serve."""
+    return MAX_SHAPES if "data" in _host(TARGETS[name], options).layouts else TEXT_SHAPES
 
 
 def _host(target: Target, options: Options) -> Host:
@@ -190,8 +199,13 @@ class _Job:
         """From a pixel, or a place on a surface, to a point."""
         if self.target.surface:
             return [surface_point(P, P)]
-        place, pixel_size = FRAMINGS[self.options.framing]
+        place, pixel_size = FRAMINGS[self.framing]
         return [place(P, P, P), pixel_size(P, P)]
+
+    @property
+    def framing(self) -> str:
+        """How it fills a canvas of another shape."""
+        return self.options.framing or self.target.framing
 
 
 def _size(scene: Scene) -> Expr:

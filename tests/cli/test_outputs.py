@@ -1,9 +1,11 @@
 """The command line: what it writes where, and what it says."""
 
+import base64
 import io
 import json
 import os
 import re
+import time
 from xml.etree import ElementTree
 
 import numpy as np
@@ -13,6 +15,7 @@ from PIL import Image
 import sdf2vec
 from sdf2vec import quality
 from sdf2vec.fit import loop
+from sdf2vec.roundtrip import Check
 from tests.cli.command import ALL, OUTPUTS, SHORT, as_png, names, picture
 
 
@@ -35,14 +38,14 @@ def test_names_of_all_outputs(folder, run):
 def test_the_summary_names_the_quality_and_every_file(folder, run):
     lines = run("photo.jpg", *SHORT, "--emit", "json", "--emit", "svg,png").out.decode().splitlines()
     assert re.fullmatch(
-        r"photo\.jpg: 24 x 16, 3 shapes, PSNR \d+\.\d\d dB, FLIP 0\.\d{4}, \d+\.\d s", lines[0]
+        r"photo\.jpg: 24 x 16, 3 shapes, PSNR \d+\.\d\d dB, FLIP 0\.\d{4}, fitted in \d+\.\d s", lines[0]
     )
-    assert [line.split(":")[0] for line in lines[1:]] == [
+    assert [line.split(":")[0] for line in lines[1:-1]] == [
         "  photo.scene.json",
         "  photo.svg",
         "  photo.render.png",
     ]
-    sizes = [int(line.split(": ")[1].split()[0].replace(",", "")) for line in lines[1:]]
+    sizes = [int(line.split(": ")[1].split()[0].replace(",", "")) for line in lines[1:-1]]
     assert sizes == [os.path.getsize(name) for name in ("photo.scene.json", "photo.svg", "photo.render.png")]
 
 
@@ -113,9 +116,67 @@ def test_the_options_of_a_fit(folder, run, monkeypatch):
 
 
 def test_quiet(folder, run):
-    outcome = run("photo.jpg", *SHORT, "--quiet")
-    assert outcome == (0, b"", "")
+    for flag, command in (("--quiet", ()), ("-q", ("--emit", "json"))):
+        assert run("photo.jpg", *SHORT, flag, *command) == (0, b"", "")
     assert (folder / "photo.glsl").exists()
+    assert run("export", "photo.scene.json", "-q", "-o", "a.glsl") == (0, b"", "")
+    assert run("render", "photo.scene.json", "-q", "-o", "a.png") == (0, b"", "")
+    assert {"a.glsl", "a.png"} <= set(names(folder))
+
+
+def test_the_summary_ends_with_all_the_seconds(folder, run, monkeypatch):
+    """Of the fit, the exports and the checks; `-v` says for what."""
+    monkeypatch.setattr("sdf2vec.converting.figure", lambda *_: time.sleep(0.4))
+    began = time.perf_counter()
+    lines = run("photo.jpg", *SHORT, "--emit", "svg", "-v").out.decode().splitlines()
+    took = time.perf_counter() - began
+    total = re.fullmatch(r"  (\d+\.\d) s in all: .*\bcheck svg 0\.[4-9] s.*", lines[-1])
+    assert total
+    fitted = re.search(r"fitted in (\d+\.\d) s", lines[0])
+    assert fitted
+    assert float(fitted[1]) + 0.3 < float(total[1]) <= took + 0.1
+    lines = run("photo.jpg", *SHORT, "--emit", "svg").out.decode().splitlines()
+    assert re.fullmatch(r"  \d+\.\d s in all", lines[-1])
+    monkeypatch.setattr("sdf2vec.converting.figure", lambda *_: pytest.fail("checked"))
+    assert run("photo.jpg", *SHORT, "--emit", "svg", "--check", "off").code == 0
+
+
+@pytest.mark.parametrize(("error", "shown"), [(261.4, "261"), (9.96, "10"), (1.24, "1.2"), (0.0312, "0.031")])
+def test_errors_are_plain_numbers(folder, run, monkeypatch, error, shown):
+    worst = Check("svg", "resvg", 24, 16, 40.0, error, 0.0)
+    monkeypatch.setattr("sdf2vec.converting.figure", lambda *_: worst)
+    out = run("photo.jpg", *SHORT, "--emit", "svg").out.decode()
+    assert f"resvg draws it at 40.0 dB, largest error {shown} levels" in out
+
+
+@pytest.mark.parametrize("name", ["photo.jpg", "photo.webp", "photo.png", "photo.bmp", "moving.webp"])
+def test_a_page_holds_the_picture_as_it_was_given(folder, run, name):
+    """Where browsers show it, and still; else as PNG."""
+    more = {"save_all": True, "append_images": [picture(seed=9)]} if name == "moving.webp" else {}
+    picture().save(folder / name, **more)
+    assert run(name, *SHORT, "--with-original", "-o", "page.html").code == 0
+    found = re.search(
+        r'class="original" src="data:image/(\w+);base64,([^"]+)"', (folder / "page.html").read_text()
+    )
+    assert found
+    held = base64.b64decode(found[2])
+    with Image.open(io.BytesIO(held)) as image:
+        assert str(image.format).lower() == found[1]
+    kept = name in ("photo.jpg", "photo.webp", "photo.png")
+    assert (held == (folder / name).read_bytes()) == kept
+    assert kept or found[1] == "png"
+
+
+def test_a_title_and_a_description(folder, run):
+    assert (
+        run("photo.jpg", *SHORT, "--title", "My <cat>", "--alt", "asleep", "-o", "a.svg", "-o", "a.html").code
+        == 0
+    )
+    root = ElementTree.parse(folder / "a.svg").getroot()
+    assert [root.findtext(f"{{*}}{name}") for name in ("title", "desc")] == ["My <cat>", "asleep"]
+    page = (folder / "a.html").read_text()
+    assert "<title>My &lt;cat&gt;</title>" in page
+    assert 'aria-label="asleep"' in page
 
 
 def test_output_is_a_file_for_one_target(folder, run):
@@ -128,6 +189,7 @@ def test_output_is_a_file_for_one_target(folder, run):
     [
         ("svg", "there", "there/photo.svg"),
         ("svg", "new/", "new/photo.svg"),
+        ("svg", "new", "new/photo.svg"),
         ("json,svg", "new", "new/photo.svg"),
     ],
 )
@@ -136,6 +198,35 @@ def test_output_is_a_folder_otherwise(folder, run, emit, out, expected):
     assert run("photo.jpg", *SHORT, "--emit", emit, "-o", out).code == 0
     assert (folder / expected).exists()
     assert len(names(folder)) == 1 + len(emit.split(","))
+
+
+def test_the_ending_of_an_output_says_what_it_is(folder, run):
+    outs = ("a.svg", "b.JPG", "c.html", "d.json", "e.webp", "f.shadertoy.glsl", "g.wgsl", "rest/")
+    outcome = run("photo.jpg", *SHORT, *(word for out in outs for word in ("-o", out)))
+    assert outcome.code == 0
+    assert names(folder) == sorted([*outs[:-1], "rest/photo.glsl", "photo.jpg"])
+    ElementTree.parse(folder / "a.svg")
+    assert [Image.open(folder / name).format for name in ("b.JPG", "e.webp")] == ["JPEG", "WEBP"]
+    assert "<!DOCTYPE html>" in (folder / "c.html").read_text()
+    assert sdf2vec.load(folder / "d.json").shape_count == 3
+    assert "mainImage" in (folder / "f.shadertoy.glsl").read_text()
+    assert "@fragment" in (folder / "g.wgsl").read_text()
+
+
+def test_a_target_with_a_file_and_the_others_in_a_folder(folder, run):
+    assert run("photo.jpg", *SHORT, "--emit", "glsl,svg,json", "-o", "x/y.svg", "-o", "out").code == 0
+    assert names(folder) == ["out/photo.glsl", "out/photo.scene.json", "photo.jpg", "x/y.svg"]
+
+
+def test_a_transparent_render_lies_on_white_where_there_is_no_alpha(folder, run):
+    shape = sdf2vec.Shape.of("circle", (1, 0, 0), center=(0, 0), radius=0.25)
+    sdf2vec.save(sdf2vec.Scene(24, 24, (sdf2vec.Layer((shape,), 0.01),), None), "disc.json")
+    outcome = run("render", "disc.json", "-o", "disc.jpg", "--size", "48")
+    assert outcome.code == 0
+    assert b"on white" in outcome.out
+    with Image.open("disc.jpg") as drawn:
+        assert (drawn.format, drawn.mode, drawn.size) == ("JPEG", "RGB", (48, 48))
+        assert np.abs(np.array(drawn, int)[[0, 24], [0, 24]] - [[255, 255, 255], [255, 0, 0]]).max() <= 3
 
 
 def test_streams_carry_nothing_but_the_export(folder, run):
@@ -160,9 +251,10 @@ def test_a_bad_input_does_not_stop_the_others(folder, run):
     picture(seed=1).save(folder / "last.png")
     (folder / "bad.png").write_bytes(b"not a picture")
     outcome = run("photo.jpg", "bad.png", "last.png", *SHORT, "--emit", "json")
-    assert outcome.code == 2
+    assert outcome.code == 3
     assert outcome.err.count("\n") == 1
     assert outcome.err.startswith("sdf2vec: bad.png: ")
+    assert outcome.out.endswith(b"3 pictures: 2 done, 1 failed\n")
     assert names(folder) == ["bad.png", "last.png", "last.scene.json", "photo.jpg", "photo.scene.json"]
 
 
@@ -173,7 +265,7 @@ def test_names_with_strange_characters(folder, run):
         os.rename(folder / "x.png", folder / name)
     outcome = run(*strange, *SHORT, "--emit", "glsl,svg")
     assert outcome.code == 0
-    assert outcome.out.count(b"\n") == 3 * 4
+    assert outcome.out.count(b"\n") == 3 * 5 + 1
     for name in strange:
         stem = name.removesuffix(".png")
         ElementTree.parse(folder / f"{stem}.svg")
@@ -249,7 +341,7 @@ def test_unusual_pictures(folder, run, name, image, note):
     lines = outcome.out.decode().splitlines()
     if note:
         assert lines[0].startswith(f"{name}: {note}")
-    assert lines[-2].startswith(f"{name}: 24 x 16, 3 shapes")
+    assert lines[-3].startswith(f"{name}: 24 x 16, 3 shapes")
 
 
 def test_notes_stay_out_of_an_export_on_standard_output(folder, run):

@@ -1,5 +1,6 @@
 """The command line on scene files: export, render, check."""
 
+import json
 from dataclasses import replace
 
 import numpy as np
@@ -9,7 +10,7 @@ from PIL import Image
 import sdf2vec
 from sdf2vec.engines import ENGINES
 from sdf2vec.roundtrip import ROUND_TRIPS
-from tests.cli.command import OUTPUTS, SHORT
+from tests.cli.command import OUTPUTS, SHORT, assert_refused
 
 
 def test_export_writes_what_the_conversion_wrote(folder, run, scene_file):
@@ -50,7 +51,9 @@ def test_check_prints_a_table(folder, run, scene_file, require_engine):
         require_engine(engine)
     outcome = run("check", scene_file, "--emit", "glsl,wgsl,godot")
     assert outcome.code == 0
-    head, *rows = outcome.out.decode().splitlines()
+    table, legend = outcome.out.decode().split("\n\n")
+    assert [line.split(":")[0] for line in legend.splitlines()] == ["same", "close", "differs"]
+    head, *rows = table.splitlines()
     assert " ".join(head.split()) == "target engine size PSNR dB largest error mean error verdict"
     assert [row.split()[:2] for row in rows] == [
         [target, engine]
@@ -70,7 +73,38 @@ def test_check_says_what_differs(folder, run, scene_file, monkeypatch, require_e
     monkeypatch.setitem(ENGINES, "opengl", replace(ENGINES["opengl"], draw=white))
     outcome = run("check", scene_file, "--emit", "glsl")
     assert outcome.code == 1
-    assert [line.split()[-1] for line in outcome.out.decode().splitlines()[1:]] == ["differs"] * 3
+    table = outcome.out.decode().split("\n\n")[0]
+    assert [line.split()[-1] for line in table.splitlines()[1:]] == ["differs"] * 3
+
+
+def test_check_of_written_files(folder, run, scene_file, require_engine):
+    """Of the file, not of what would be written now: a shader that has been changed by hand differs."""
+    for engine in ("opengl", "webgpu"):
+        require_engine(engine)
+    run("export", scene_file, "--emit", "glsl,wgsl", "--layout", "data", "-o", "made")
+    outcome = run("check", "made/photo.wgsl", "made/photo.glsl", scene_file, "--json")
+    assert outcome.code == 0
+    results = json.loads(outcome.out)
+    assert [(r["target"], r["verdict"]) for r in results] == [("glsl", "same")] * 3 + [("wgsl", "same")] * 3
+    assert results[0]["width"] == 24
+    assert results[0]["limit"] is None
+    text = (folder / "made/photo.glsl").read_text()
+    (folder / "made/photo.glsl").write_text(text.replace("fragColor = ", "fragColor = 0.9 * ", 1))
+    assert run("check", "made/photo.glsl", scene_file, "-q") == (1, b"", "")
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        (["photo.jpg", "made/photo.scene.json"], ["nothing to check"]),
+        (["made/photo.svg", "made/photo.glsl"], ["scene file", "got 0"]),
+        (["made/photo.svg", "made/photo.svg", "made/photo.scene.json"], ["a second svg"]),
+        (["made/none.svg", "made/photo.scene.json"], ["made/none.svg: cannot read it"]),
+        (["made/photo.svg", "made/photo.scene.json", "--emit", "glsl"], ["not both"]),
+    ],
+)
+def test_what_can_not_be_checked(folder, run, scene_file, arguments, words):
+    assert_refused(run("check", *arguments), *words)
 
 
 @pytest.fixture

@@ -85,3 +85,165 @@ def test_every_operation_means_the_same_in_javascript(opened):
     for (name, meaning), values in zip(MEANINGS.items(), found, strict=True):
         wanted = expected(meaning, np.array(meaning.cases))
         np.testing.assert_allclose(np.array(values, float).T, wanted, rtol=1e-9, atol=1e-12, err_msg=name)
+
+
+# --- many elements, lost contexts ------------------------------------------------------------------------------
+
+COUNT_CONTEXTS = """<script>window.contexts = [];
+const before = HTMLCanvasElement.prototype.getContext;
+HTMLCanvasElement.prototype.getContext = function (kind, ...more) {
+  const made = before.call(this, kind, ...more);
+  if (kind === "webgl2" && made && !contexts.includes(made)) contexts.push(made);
+  return made;
+};</script>"""
+GRID = (
+    "<style>*{margin:0}body{display:grid;grid-template-columns:repeat(10,40px);grid-auto-rows:40px}</style>"
+)
+MODULE = '<script type="module" src="sdf-image.js"></script>'
+SHOWN = (
+    """[...document.querySelectorAll('sdf-image')].map((e) => e.shadowRoot?.querySelector('slot').hidden)"""
+)
+
+
+def element(name):
+    return f'<sdf-image src="{name}" alt="{name}"><p>Not drawn</p></sdf-image>'
+
+
+def assert_all_shown(page, scenes, shown=None):
+    """Every element of the grid shows its scene, in 40 × 40 pixels."""
+    page.wait_for_function(f"{SHOWN}.length === {len(scenes)} && {SHOWN}.every(Boolean)")
+    page.wait_for_timeout(300)
+    pixels = chromium.screenshot(page)
+    pixels[..., :3] *= pixels[..., 3:]
+    for index, scene in enumerate(scenes):
+        row, column = divmod(index, 10)
+        found = pixels[40 * row : 40 * row + 40, 40 * column : 40 * column + 40]
+        expected = reference.render(scene, 40, 40).permute(1, 2, 0).numpy()
+        assert 255 * np.abs(found - expected).max() <= 2.1
+
+
+def test_sixty_elements_share_one_context(require_engine):
+    """Browsers give a page 16 contexts or so. Scenes of any size and compositing share it."""
+    require_engine("chromium")
+    several = [
+        random_scene(
+            compositing=compositing,
+            layers=3 + seed,
+            seed=seed,
+            width=50,
+            height=50,
+            transparent=bool(seed % 2),
+        )
+        for seed in range(6)
+        for compositing in ("over", "additive")
+    ]
+    files = {f"{i}.scene.json": dumps(scene) for i, scene in enumerate(several)}
+    order = [i % len(several) for i in range(60)]
+    page = COUNT_CONTEXTS + GRID + MODULE + "".join(element(f"{i}.scene.json") for i in order)
+    with chromium.opened({"index.html": page, "sdf-image.js": module(), **files}, 400, 240) as shown:
+        assert_all_shown(shown, [several[i] for i in order])
+        assert shown.evaluate("contexts.length") == 1
+
+
+def test_a_lost_context_keeps_what_is_shown_and_comes_back(require_engine):
+    require_engine("chromium")
+    scene = random_scene(layers=5, seed=2, width=50, height=50)
+    page = COUNT_CONTEXTS + GRID + MODULE + element("a.scene.json")
+    files = {"index.html": page, "sdf-image.js": module(), "a.scene.json": dumps(scene)}
+    with chromium.opened(files, 400, 80) as shown:
+        assert_all_shown(shown, [scene])
+        shown.evaluate("window.lose = contexts[0].getExtension('WEBGL_lose_context'); lose.loseContext()")
+        shown.evaluate(f"document.body.insertAdjacentHTML('beforeend', `{element('a.scene.json')}`)")
+        shown.wait_for_timeout(500)
+        assert shown.evaluate(SHOWN) == [True, False]
+        assert shown.get_by_text("Not drawn").nth(1).is_visible()
+        shown.evaluate("lose.restoreContext()")
+        assert_all_shown(shown, [scene, scene])
+        assert shown.evaluate("contexts.length") == 1
+
+
+def test_an_element_moved_in_its_page_goes_on(opened):
+    scene = random_scene(layers=5, seed=2, width=60, height=40)
+    with opened(dumps(scene), 300, 200) as page:
+        assert_shows(page, scene, 300, 200)
+        page.evaluate("const e = document.querySelector('sdf-image'); e.remove(); document.body.append(e)")
+        page.set_viewport_size({"width": 150, "height": 100})
+        assert_shows(page, scene, 150, 100)
+
+
+# --- hostile files ---------------------------------------------------------------------------------------------
+
+GOOD = json.loads(dumps(random_scene(("circle",), layers=2, seed=3, width=50, height=50)))
+JOINED = {"shapes": [{"kind": "circle", "center": [0, 0], "radius": 0.1, "color": [1, 0, 0]}] * 2}
+WIDE = {"kind": "circle", "center": [0, 0], "radius": 9, "color": [1, 0, 0], "opacity": 0.5, "falloff": 0.1}
+
+
+def changed(path, value):
+    """The good scene with one field changed."""
+    scene = json.loads(json.dumps(GOOD))
+    place = scene
+    for key in path[:-1]:
+        place = place[key]
+    place[path[-1]] = value
+    return scene
+
+
+HOSTILE = [
+    (changed(["background"], ["0.0); discard; //", 0, 0]), "background"),
+    (changed(["background"], "red"), "background"),
+    (changed(["background"], [0, 0, 2]), "background"),
+    (changed(["width"], 1e9), "width"),
+    (changed(["width"], "50"), "width"),
+    (changed(["height"], 0), "height"),
+    (changed(["compositing"], "constructor"), "compositing"),
+    (changed(["layers"], {"length": 3}), "layers"),
+    (changed(["layers"], [None]), "layers[0]"),
+    (changed(["layers", 1, "kind"], "__proto__"), "layers[1].kind"),
+    (changed(["layers", 1, "paint"], "toString"), "layers[1].paint"),
+    (changed(["layers", 1, "radius"], -1), "layers[1].radius"),
+    (changed(["layers", 1, "radius"], 0), "layers[1].radius"),
+    (changed(["layers", 1, "radius"], 1e300), "layers[1].radius"),
+    (changed(["layers", 1, "radius"], None), "layers[1].radius"),
+    (changed(["layers", 1, "radius"], [1]), "layers[1].radius"),
+    (changed(["layers", 1, "center"], [0]), "layers[1].center"),
+    (changed(["layers", 0, "color"], [-0.1, 0, 0]), "layers[0].color"),
+    (changed(["layers", 0, "opacity"], -0.5), "layers[0].opacity"),
+    (changed(["layers", 0], JOINED | {"shapes": []}), "layers[0].shapes"),
+    (changed(["layers", 0], JOINED | {"shapes": JOINED["shapes"] * 80}), "layers[0].shapes"),
+    (
+        changed(["layers", 0], {"shapes": [*JOINED["shapes"], JOINED["shapes"][0] | {"join": "xor"}]}),
+        "shapes[2].join",
+    ),
+    (
+        changed(["layers", 0], {"shapes": [JOINED["shapes"][0], JOINED["shapes"][0] | {"smoothness": -1}]}),
+        "smoothness",
+    ),
+    (changed(["layers"], [WIDE] * 65536), "layers"),
+    (changed(["layers"], [WIDE] * 8192), "layers"),
+    ([], "format"),
+    (None, "format"),
+]
+
+
+def test_what_scene_files_may_not_say_is_refused(opened):
+    """As `loads` refuses it, but for what is too much for a page; and nothing of it gets into a shader."""
+    names = [words for _, words in HOSTILE]
+    for scene, _ in HOSTILE[:-4]:
+        with pytest.raises(sdf2vec.Sdf2vecError):
+            sdf2vec.loads(json.dumps(scene))
+    collect = """(scenes) => {
+      const e = document.querySelector('sdf-image');
+      return scenes.map((scene) => { try { e.show(scene); return 'shown' } catch (error) { return error.message } });
+    }"""
+    with opened(json.dumps(GOOD), 100, 100) as page:
+        page.wait_for_function(f"{SHOWN}[0]")
+        found = page.evaluate(collect, [scene for scene, _ in HOSTILE])
+        assert [words in said for words, said in zip(names, found, strict=True)] == [True] * len(names), found
+        assert_shows(page, sdf2vec.loads(json.dumps(GOOD)), 100, 100)
+
+
+@pytest.mark.parametrize(("width", "height"), [(65536, 1), (1, 65536)])
+def test_the_thinnest_scene_is_quick(opened, width, height):
+    scene = random_scene(("circle",), layers=40, seed=3, width=width, height=height)
+    with opened(dumps(scene), 100, 100) as page:
+        page.wait_for_function(f"{SHOWN}[0]", timeout=20_000)

@@ -72,7 +72,7 @@ def test_hosts_draw_it(target, engine, layouts, transparent, compositing, requir
 @pytest.mark.parametrize("layout", ["readable", "table", "tiled", "packed"])
 def test_chromium_draws_what_shadertoy_wraps(layout, require_engine):
     require_engine("chromium")
-    made = shader(SCENE, "shadertoy", Options(layout=layout))
+    made = shader(SCENE, "shadertoy", Options(layout=layout, framing="fit"))
     for width, height in SIZES:
         uniforms = {"iResolution": (float(width), float(height), 1.0)}
         drawn = webgl.render(SHADERTOY_HEAD + made.text + SHADERTOY_TAIL, width, height, uniforms)
@@ -129,7 +129,7 @@ def test_a_fitted_photo_in_a_browser(photo, require_engine):
     require_engine("chromium")
     scene = photo
     for target, layout in (("glsl", "data"), ("shadertoy", "tiled")):
-        made = shader(scene, target, Options(layout=layout))
+        made = shader(scene, target, Options(layout=layout, framing="fit"))
         text = SHADERTOY_HEAD + made.text + SHADERTOY_TAIL if target == "shadertoy" else made.text
         for width, height in ((150, 100), (107, 60), (64, 64)):
             uniforms = {"resolution": (width, height), "iResolution": (width, height, 1.0)}
@@ -172,6 +172,7 @@ def test_the_default_shadertoy_of_256_shapes(photo, require_engine):
     made = shader(scene, "shadertoy", Options(title="coffee"))
     assert made.choice.layout == "packed"
     assert len(made.text.encode()) <= 15_360  # 15 KiB
+    made = shader(scene, "shadertoy", Options(title="coffee", framing="fit"))
     uniforms = {"iResolution": (960.0, 540.0, 1.0)}
     drawn = opengl.render(SHADERTOY_HEAD + made.text + SHADERTOY_TAIL, 960, 540, uniforms)
     assert levels(drawn, rendered(scene, 960, 540)) <= 1.0

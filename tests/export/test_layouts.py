@@ -95,7 +95,7 @@ def test_storage_buffer_agrees_with_statements(compositing, require_engine):
 def test_packed_is_within_its_error(kinds, compositing, require_engine):
     require_engine("opengl")
     scene = smoothed(random_scene(kinds, compositing, layers=16, seed=6))
-    made = sdf2vec.exported(scene, "shadertoy", layout="packed")
+    made = sdf2vec.exported(scene, "shadertoy", layout="packed", framing="fit")
     assert 0.0 < made.error <= packing.LIMIT
     for size in SIZES:
         result = compare(ROUND_TRIPS["shadertoy"][0], made, scene, size)
@@ -108,7 +108,7 @@ def test_what_cuts_a_layer_may_lie_far_outside(join, require_engine):
     require_engine("opengl")
     shapes = (Shape("circle", (0, 0, 0.2), (1, 0, 0)), Shape("circle", (20.0, 0.05, 20.0)))
     scene = Scene(60, 40, (Layer(shapes, 0.02, 1.0, (Joint(join, 0.0),)),), (0, 0, 1))
-    made = sdf2vec.exported(scene, "shadertoy", layout="packed")
+    made = sdf2vec.exported(scene, "shadertoy", layout="packed", framing="fit")
     assert compare(ROUND_TRIPS["shadertoy"][0], made, scene, (150, 100)).largest_error <= 1.0
 
 
@@ -180,6 +180,40 @@ def test_cover_cuts_what_fit_would_not_fill(layout, require_engine):
     covered = draw(scene, "shadertoy", (400, 200), layout, framing="cover")
     whole = draw(scene, "shadertoy", (400, 400), layout)
     np.testing.assert_allclose(covered, whole[100:300], atol=1e-5)
+
+
+@pytest.mark.parametrize("transparent", [False, True])
+@pytest.mark.parametrize(
+    ("target", "layout"),
+    [
+        ("shadertoy", "readable"),
+        ("shadertoy", "tiled"),
+        ("shadertoy", "packed"),
+        ("glsl", "data"),
+        ("wgsl", "readable"),
+    ],
+)
+def test_crop_shows_the_ground_around_the_picture(target, layout, transparent, require_engine):
+    """On wider and on higher canvases; what lies within the frame stays as it is."""
+    require_engine(ROUND_TRIPS[target][0].engine)
+    scene = random_scene(("circle",), seed=2, width=100, height=100, transparent=transparent)
+    ground = [0.0] * 4 if scene.background is None else [*scene.background, 1.0]
+    for size, place in (((400, 200), np.s_[:, 100:300]), ((100, 160), np.s_[30:130, :])):
+        cropped = draw(scene, target, size, layout, framing="crop")
+        fitted = draw(scene, target, size, layout)
+        np.testing.assert_allclose(cropped[place], fitted[place], atol=1e-5)
+        outside = np.ones(cropped.shape[:2], bool)
+        outside[place] = False
+        np.testing.assert_allclose(cropped[outside], np.broadcast_to(ground, (outside.sum(), 4)), atol=1e-5)
+        assert np.abs(fitted[outside] - ground).max() > 0.1
+
+
+def test_what_is_pasted_is_cropped_unless_told():
+    scene = random_scene(("circle",), seed=2)
+    assert sdf2vec.export(scene, "shadertoy") == sdf2vec.export(scene, "shadertoy", framing="crop")
+    for target in ("glsl", "wgsl"):
+        assert sdf2vec.export(scene, target) == sdf2vec.export(scene, target, framing="fit")
+    assert "cropped" not in str(sdf2vec.export(scene, "shadertoy", framing="cover"))
 
 
 @pytest.mark.parametrize("layout", ["readable", "table", "tiled", "packed"])

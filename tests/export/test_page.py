@@ -114,8 +114,12 @@ def _canonical(drawing):
     return ElementTree.canonicalize(drawing, strip_text=True)
 
 
+def png_of_red():
+    return encode_png(np.broadcast_to(np.array([1, 0, 0], np.float32), (8, 12, 3)))
+
+
 def test_slider_uncovers_the_original(opened):
-    red = encode_png(np.broadcast_to(np.array([1, 0, 0], np.float32), (8, 12, 3)))
+    red = png_of_red()
     blue = Scene(12, 8, (Layer((Shape.of("circle", (0, 0, 1), center=(0, 0), radius=3),), 0.1),))
     with opened(page_of(blue, original=red), 300, 300) as page:
         page.wait_for_function("document.querySelector('canvas').width > 1")
@@ -129,6 +133,12 @@ def test_slider_uncovers_the_original(opened):
         )
         np.testing.assert_allclose(shown[20, edge + 3 : -5, 2], 1, atol=0.01)
         assert page.evaluate("document.querySelector('.original').alt")
+
+
+def test_what_is_in_the_picture_is_the_name_of_all_that_show_it(opened):
+    with opened(page_of(SCENE, alt="A <cat>", original=png_of_red()), 300, 300) as page:
+        assert page.get_by_role("img", name="A <cat>").count() == 2
+        assert page.locator("svg desc").text_content() == "A <cat>"
 
 
 def test_page_speaks_to_screen_readers(opened):

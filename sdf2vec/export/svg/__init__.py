@@ -6,20 +6,23 @@ import base64
 import re
 from collections.abc import Callable
 from dataclasses import replace
+from urllib.parse import quote
 
 from ...deferred import deferred
 from ...errors import Sdf2vecError
 from ...files import one_line
 from ...scene import Scene
-from ..exported import Exported
+from ..exported import MARK, Exported
 from ..options import Accepts, Options
 from .layers import drawing
 from .plan import DETAILS, Detail, Planner
 from .writer import MARGINS, Style, written
 
 PORTABLE = "portable"
+IN_QUOTES = "!$'()*+,;=:@/?"  # what a URI takes as it is, but for "&", which HTML does not
 ACCEPTED = ("over",)
 CREATED = re.compile(rb"(/CreationDate \(D:)([^)]*)")
+PRODUCER = re.compile(rb"(?<=/Producer \()(cairo [\d.]+) \(https?://cairographics\.org\)(?=\))")
 
 svg2pdf: Callable[..., bytes] = deferred("cairosvg", "svg2pdf")
 
@@ -61,9 +64,16 @@ def smallest(scene: Scene, options: Options) -> str:
 
 
 def data_uri(scene: Scene, options: Options) -> Exported:
-    """The SVG as a data URI, for `src` and `url()`; base64, which every parser takes."""
+    """The SVG as a data URI, for `src="…"` and `url("…")`: URL-encoded, or in base64 where that is smaller."""
     made = svg(scene, options)
-    return replace(made, data="data:image/svg+xml;base64," + base64.b64encode(made.raw).decode())
+    encoded = "data:image/svg+xml;base64," + base64.b64encode(made.raw).decode()
+    return replace(made, data=min(f"data:image/svg+xml,{_quoted(str(made.data))}", encoded, key=len))
+
+
+def _quoted(text: str) -> str:
+    """An SVG text as part of a URI, in as few characters as stand between double quotes."""
+    text = text.strip().replace(">\n<", "><").replace("'", "&#39;").replace('"', "'")
+    return quote(text, safe=IN_QUOTES)
 
 
 def pdf(scene: Scene, options: Options) -> Exported:
@@ -73,10 +83,10 @@ def pdf(scene: Scene, options: Options) -> Exported:
         found = svg2pdf(bytestring=made.raw)
     except OSError:  # the package is there, the system's library is not
         raise Sdf2vecError("pdf: needs cairo: apt-get install libcairo2") from None
-    undated = CREATED.sub(
-        lambda found: found[1] + b"0" * len(found[2]), found
-    )  # the same scene, the same file
-    return replace(made, data=undated)
+    # The same scene, the same file; and who made it. Places in the file stay where they are.
+    undated = CREATED.sub(lambda match: match[1] + b"0" * len(match[2]), found)
+    said = f"{MARK}, ".encode()
+    return replace(made, data=PRODUCER.sub(lambda match: (said + match[1]).ljust(len(match[0])), undated))
 
 
 def _planner(scene: Scene, profile: str) -> Planner:
@@ -89,7 +99,7 @@ def _text(planner: Planner, detail: Detail, options: Options) -> str:
     grain = detail.grain
     style = Style(detail.named, grain is not None, grain.margins if grain else MARGINS)
     drawn = drawing(planner.scene, planner.plan(detail), detail)
-    return written(drawn, one_line(options.title), style)
+    return written(drawn, one_line(options.title), style, one_line(options.alt) if options.alt else "")
 
 
 def _coarser(detail: Detail, limit: int) -> str:

@@ -86,14 +86,21 @@ def _traced(layer: Layer, canvas: Canvas) -> Blurred | None:
     """The nearest blur of a contour of a layer that has no outline of its own."""
     trial = trial_of(layer, canvas, *TRACED_CELLS)
     field = distances(layer, trial.grid) - 0.5 * layer.falloff
-    down, across = np.gradient(field, trial.grid.step)
     edge = trial.wanted * (1.0 - trial.wanted) * trial.seen
     if edge.sum() < 1e-3:
         return None
-    steep = max(float(np.sum(edge * np.hypot(down, across)) / edge.sum()), 0.1)  # 1 for a true distance
+    steep = max(
+        float(np.sum(edge * steepness(field, trial.grid.step)) / edge.sum()), 0.1
+    )  # 1 for a true distance
     tried = (found for width in WIDTHS for found in trial.moved(field / steep, width / steep))
     plain = Traced(tuple(contours(field, 0.0, trial.grid)))
     return nearest([*tried, trial.judged(plain, field / steep, 0.0)])
+
+
+def steepness(field: Float64Array, step: float) -> Float64Array:
+    """How much a field [Y, X] changes by a unit of length; along an axis with a single row nothing does."""
+    changes = (np.gradient(field, step, axis=axis) for axis in (0, 1) if field.shape[axis] > 1)
+    return np.asarray(sum((np.square(change) for change in changes), np.zeros_like(field)) ** 0.5)
 
 
 def nearest(tried: Sequence[Blurred]) -> Blurred:

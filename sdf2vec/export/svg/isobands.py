@@ -18,6 +18,7 @@ TRACE = 768  # grid cells along the canvas' shortest side
 SOFTLY = 12  # grid cells in a falloff are enough
 FEWEST = 96  # grid cells along the longest side of a small shape
 MAX_CELLS = 2048  # grid cells along any side
+WORK = 1 << 23  # grid cells × shapes: coarser for large unions
 FEWEST_BANDS, MOST_BANDS = 3, 24
 BANDS_A_PIXEL = 1.4
 
@@ -47,7 +48,8 @@ def trace_grid(layer: Layer, canvas: Canvas) -> SampleGrid | None:
     if box.empty:
         return None
     fine = min(max(1.0 / TRACE, layer.falloff / SOFTLY), box.longest / FEWEST)
-    step = max(fine, box.longest / MAX_CELLS)
+    area = (box.right - box.left) * (box.bottom - box.top)
+    step = max(fine, box.longest / MAX_CELLS, math.sqrt(area * len(layer.shapes) / WORK))
     return grid_over(box.grown(step), step)
 
 

@@ -37,6 +37,7 @@ TRANSPARENT_LIFT = 0.5  # 8-bit levels: on no ground browsers lose half of one a
 PARTS_COARSER = 8.0  # the parts of a union are dearer than other bands: every shape has bands of its own
 NARROW = 12.0  # pixels: bands of a softer edge need no antialiasing
 LOOSEST = 1.0  # user units that a contour of a soft edge may be off
+MOST_PARTS = 16  # shapes of a union that have parts of their own; a larger one is painted with a gradient
 MIXED = 7.5  # by so much more than the stops of an edge may a gradient through a union be off
 NOWHERE = Path(())  # of a contour that no place on the canvas reaches
 
@@ -74,7 +75,7 @@ class Painter:
             return self._patch(layer, index)
         lift = self.lift if blurred is not None and blurred.deviation else 0.0
         fill, error = fill_of(layer, canvas, lift)
-        if error > MIXED * self.detail.levels and len(layer.seen) > 1:
+        if error > MIXED * self.detail.levels and 1 < len(layer.seen) <= MOST_PARTS:
             return self._parts(layer, self.plan.bands[index])
         if self.detail.grain:
             return figure(layer, blurred, canvas) if blurred else None

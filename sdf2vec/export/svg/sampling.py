@@ -21,6 +21,7 @@ from ...shapes import KINDS
 from ...threads import threads_of_its_own
 
 CHUNK = 1 << 15  # points computed at a time
+MANY = 16  # shapes of a layer for which compiling takes longest: all is asked for at once
 
 
 class Box(NamedTuple):
@@ -144,9 +145,9 @@ def colors(layer: Layer, grid: SampleGrid) -> Float64Array:
 
 
 def _evaluate(layer: Layer, grid: SampleGrid, pixel: float, count: int) -> Float64Array:
-    """The first `count` of distance, coverage, red, green, blue: [count, Y, X]."""
+    """The first `count` of distance, coverage, red, green, blue, at least: [count or more, Y, X]."""
     flat = [torch.tensor(value, dtype=torch.float64) for value in (pixel, *layer.numbers)]
-    formula = _formula(layer.structure, count)
+    formula = _formula(layer.structure, 5 if len(layer.shapes) > MANY else count)
     columns = torch.from_numpy(grid.x)[None, :]
     chunks = torch.from_numpy(grid.y)[:, None].split(max(1, CHUNK // len(grid.x)))
     with threads_of_its_own():  # on such small pieces a second one mostly waits, for long when it has no core

@@ -89,7 +89,7 @@ def nearest_gradient(
     slope, *_ = np.linalg.lstsq(flat * root, wanted * root, rcond=None)
     direction = np.linalg.svd(slope[:2].T)[2][0]
     along = (places - middle) @ direction
-    kept = along[weight > 1e-3]
+    kept = along[weight > min(1e-3, weight.max() / 2)]
     knots = np.linspace(kept.min(), kept.max(), STOPS)
     hats = np.stack([np.interp(along, knots, row) for row in np.eye(STOPS)], axis=1)
     ridge = 1e-3 * np.sqrt(weight.sum()) * np.eye(STOPS)

@@ -20,6 +20,7 @@ Float = TypeVar("Float", np.float32, np.float64)
 
 SIDE = 128  # pixels along the shortest side of the small canvas
 MOST = 1 << 23  # layers × pixels
+LONG = 1 << 18  # pixels, of a canvas that is very long
 AT_ONCE = 1 << 20  # of them, for a formula holds dozens of numbers for each
 
 
@@ -97,6 +98,7 @@ def layers_at(scene: Scene) -> LayerSamples:
 def _small_canvas(scene: Scene) -> tuple[int, int]:
     """Width and height of a canvas with SIDE pixels along its shortest, fewer where there are many layers."""
     shortest = min(scene.width, scene.height)
-    allowed = (MOST / len(scene.layers) * shortest**2 / (scene.width * scene.height)) ** 0.5
+    most = min(MOST / len(scene.layers), LONG)
+    allowed = (most * shortest**2 / (scene.width * scene.height)) ** 0.5
     scale = min(SIDE, max(8, int(allowed)), shortest) / shortest
     return max(1, round(scene.width * scale)), max(1, round(scene.height * scale))

@@ -18,6 +18,7 @@ import svgwrite
 
 from ...outlines import EllipseOutline, Point, PolygonOutline, RectangleOutline
 from ...scene import Color
+from ..exported import MARK
 from .canvas import Points, pairs
 from .display import (
     Contour,
@@ -57,12 +58,14 @@ class Style:
     margins: Sequence[float] = MARGINS
 
 
-def written(drawing: Drawing, title: str, style: Style) -> str:
-    """The whole SVG. Ids begin with a hash of the content, so that drawings can share a page."""
+def written(drawing: Drawing, title: str, style: Style, alt: str = "") -> str:
+    """The whole SVG, described by `alt`. Ids begin with a hash of the content, so that drawings can share a page."""
     inner = _Writer(drawing, style).text()
     prefix = "s" + hashlib.sha256(inner.encode()).hexdigest()[:5]
     head, rest = inner.replace(PREFIX, prefix).split(">", 1)
-    return f"{head}>\n<title>{escape(title)}</title>{rest}\n"
+    title, alt = (escape(text, {'"': "&quot;"}) for text in (title, alt))
+    told = f"<desc>{alt}</desc>" if alt else ""
+    return f"{head}>\n<title>{title}</title>{told}<!-- {MARK} -->{rest}\n"
 
 
 class _Writer:

@@ -4,6 +4,8 @@ import base64
 import math
 import re
 from dataclasses import replace
+from urllib.parse import unquote
+from urllib.request import urlopen
 from xml.etree import ElementTree
 
 import numpy as np
@@ -11,7 +13,7 @@ import pytest
 
 from sdf2vec import Layer, Scene, Sdf2vecError, Shape
 from sdf2vec.export.options import Options
-from sdf2vec.export.svg import accepts, data_uri, pdf
+from sdf2vec.export.svg import _quoted, accepts, data_uri, pdf
 from sdf2vec.export.svg import svg as write_svg
 from tests.export.svg.drawings import (
     NAMESPACE,
@@ -120,11 +122,32 @@ def test_a_size_limit_is_kept_or_refused():
         text_of(sharp, svg_size_limit=500)
 
 
-def test_a_data_uri_holds_the_svg():
+@pytest.mark.parametrize("title", ["photo", "a 'quoted' \"50 %\" #1 & <more>", "写真" * 2000])
+def test_a_data_uri_holds_the_svg(title):
+    """In what an address may have in double quotes; in base64 where that is smaller."""
     scene = random_scene(layers=3, seed=4)
-    head, _, body = str(data_uri(scene, Options()).data).partition(",")
-    assert head == "data:image/svg+xml;base64"
-    assert base64.b64decode(body).decode() == text_of(scene)
+    address = str(data_uri(scene, Options(title=title)).data)
+    with urlopen(address) as stream:  # Python's own reader of data URIs
+        assert stream.headers.get_content_type() == "image/svg+xml"
+        found = stream.read().decode()
+    wanted = text_of(scene, title=title)
+    assert ElementTree.canonicalize(found, strip_text=True) == ElementTree.canonicalize(
+        wanted, strip_text=True
+    )
+    encoded = "data:image/svg+xml;base64," + base64.b64encode(wanted.encode()).decode()
+    assert address == encoded if len(title) > 1000 else len(address) < 0.96 * len(encoded)
+    assert re.fullmatch(r"[!#$'()*+,\-./0-9:;=?@A-Z_a-z~%]+", address)
+    assert "#" not in address
+
+
+def test_quotes_in_attributes_of_a_data_uri_survive():
+    assert ElementTree.fromstring(unquote(_quoted('<a b="it\'s"/>'))).get("b") == "it's"
+
+
+def test_what_is_in_the_picture_is_said():
+    root = ElementTree.fromstring(text_of(random_scene(layers=1), title="<cat>", alt="A cat & a\nhat"))
+    assert [root.findtext(f"{{*}}{name}") for name in ("title", "desc")] == ["<cat>", r"A cat & a\nhat"]
+    assert ElementTree.fromstring(text_of(random_scene(layers=1))).find("{*}desc") is None
 
 
 def test_a_pdf_of_the_portable_profile(require_engine):

@@ -1,0 +1,292 @@
+"""Known scenes found again: how many shapes, of which kinds, how near. Writes a table and a figure for each tool.
+
+    python -m sdf2vec.bench.known --shapes auto --tool sdf2vec --tool vtracer -o docs/known.md
+
+For another tool: `--pictures FOLDER` writes the pictures, `--svg FOLDER` judges the SVG of the same names.
+"""
+
+from __future__ import annotations
+
+import argparse
+import time
+from collections.abc import Callable, Iterator
+from itertools import product
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from .. import api
+from ..arrays import Float32Array
+from ..errors import Sdf2vecError
+from ..files import write_atomically
+from ..image import Picture, encode_png
+from . import vtracer
+from .known_drawing import KnownScene
+from .known_scenes import COUNTS, MODES, SIDE, known_scene
+from .recovery import ENOUGH, Answer, Verdict, f1, judged, scene_answer, svg_answer
+
+SEEDS = 20
+KINDS = "circle,ellipse,box,triangle"
+GUTTER = 3  # pixels between pictures of the figure
+EDGES = ("sharp", "soft")
+
+
+class Case(NamedTuple):
+    """One scene, by what it is made from: a soft one for every odd seed."""
+
+    mode: str
+    true: int
+    seed: int
+
+    @property
+    def name(self) -> str:
+        return f"{self.mode}-{self.true:02}-{self.seed:02}"
+
+    @property
+    def edges(self) -> str:
+        return EDGES[self.seed % 2]
+
+    @property
+    def known(self) -> KnownScene:
+        return known_scene(self.true, self.mode, self.edges == "soft", self.seed)
+
+
+class Result(NamedTuple):
+    """What a tool made of a scene; the pictures, true and found, side by side for the figure."""
+
+    case: Case
+    verdict: Verdict
+    pictures: Float32Array
+
+
+# --- tools --------------------------------------------------------------------------------------------------
+
+
+def fitted(known: KnownScene, shapes: int | str, **options: Any) -> Answer:
+    """What this program finds; `options` as in `api.fit`."""
+    started = time.process_time()
+    scene = api.fit(Picture(known.pixels), shapes, **options)  # type: ignore[arg-type] # "auto", where it can
+    return scene_answer(scene, time.process_time() - started)
+
+
+def by_fit(case: Case, known: KnownScene, options: argparse.Namespace) -> Answer:
+    """This program, told how many shapes there are or nothing."""
+    chosen = {name: getattr(options, name) for name in ("kind", "preset", "cuts") if getattr(options, name)}
+    if options.shapes == "auto":
+        return fitted(known, "auto", seed=case.seed, **chosen)
+    return fitted(known, max(case.true, 1), seed=case.seed, **({"kind": KINDS} | chosen))
+
+
+def by_vtracer(case: Case, known: KnownScene, options: argparse.Namespace) -> Answer:
+    """vtracer at its defaults."""
+    started = time.process_time()
+    svg = vtracer.traced(encode_png(known.pixels))
+    return svg_answer(svg, known.side, time.process_time() - started)
+
+
+def by_file(case: Case, known: KnownScene, options: argparse.Namespace) -> Answer:
+    """An SVG that some tool has written."""
+    path: Path = options.svg / f"{case.name}.svg"
+    try:
+        return svg_answer(path.read_text(encoding="utf-8"), known.side)
+    except OSError as error:
+        raise Sdf2vecError(
+            f"{path}: {error.strerror}; --pictures writes what it is to be made from"
+        ) from error
+
+
+def by_truth(case: Case, known: KnownScene, options: argparse.Namespace) -> Answer:
+    """The true shapes as this program draws them: no fit comes nearer with as many."""
+    return scene_answer(known.scene)
+
+
+TOOLS: dict[str, Callable[[Case, KnownScene, argparse.Namespace], Answer]] = {
+    "sdf2vec": by_fit,
+    "vtracer": by_vtracer,
+    "files": by_file,
+    "truth": by_truth,
+}
+
+
+def result(tool: str, case: Case, known: KnownScene, options: argparse.Namespace) -> Result:
+    """One scene through one tool."""
+    answer = TOOLS[tool](case, known, options)
+    verdict = judged(known, answer)
+    print(
+        f"{tool}, {case.name}: {verdict.found} of {verdict.true} shapes, {verdict.matched} right, "
+        f"{verdict.outlines} outlines, {verdict.psnr:.1f} dB, {verdict.seconds:.1f} s",
+        flush=True,
+    )
+    return Result(case, verdict, np.vstack([known.pixels, _gutter(known.side, across=True), answer.pixels]))
+
+
+# --- the page -----------------------------------------------------------------------------------------------
+
+COLUMNS = (
+    "true",
+    "scenes",
+    "found / true",
+    "90 %",
+    "PSNR dB",
+    "worst",
+    "≥ 40 dB",
+    "F1",
+    "F1, any kind",
+    "seconds",
+)
+
+
+def row(name: str, true: str, verdicts: list[Verdict]) -> str:
+    """Some scenes together: one row of the table."""
+    ratios = [verdict.ratio for verdict in verdicts]
+    near = np.array([verdict.psnr for verdict in verdicts])
+    return (
+        f"| {name} | {true} | {len(verdicts)} | {np.median(ratios):.2f} | {np.quantile(ratios, 0.9):.2f} "
+        f"| {np.median(near):.1f} | {near.min():.1f} | {100 * (near >= ENOUGH).mean():.0f} % | {f1(verdicts):.3f} "
+        f"| {f1(verdicts, of_kind=False):.3f} | {np.median([v.seconds for v in verdicts]):.1f} |"
+    )
+
+
+def table(results: list[Result]) -> Iterator[str]:
+    """A row for each mode and number of shapes, then what is sharp and what is soft of each mode, then all of it."""
+    yield f"| shapes are | {' | '.join(COLUMNS)} |"
+    yield "|---|" + "---:|" * len(COLUMNS)
+    counts = sorted({r.case.true for r in results})
+    modes = [mode for mode in MODES if any(r.case.mode == mode for r in results)]
+    for mode, count in product(modes, counts):
+        yield from _rows(mode, str(count), [r for r in results if r.case[:2] == (mode, count)])
+    for mode in modes:
+        own = [r for r in results if r.case.mode == mode]
+        for edges in EDGES:
+            yield from _rows(f"{mode}, {edges}", "all", [r for r in own if r.case.edges == edges])
+        yield from _rows(f"**{mode}**", "all", own)
+
+
+def _rows(name: str, true: str, results: list[Result]) -> Iterator[str]:
+    if results:
+        yield row(name, true, [r.verdict for r in results])
+
+
+def figure(results: list[Result]) -> bytes:
+    """A PNG: a column for each number of shapes; true above found, sharp and soft of each mode."""
+    rows = []
+    for mode, edges in product(MODES, EDGES):
+        first: dict[int, Float32Array] = {}
+        for r in results:
+            if (r.case.mode, r.case.edges) == (mode, edges):
+                first.setdefault(r.case.true, r.pictures)
+        if first:
+            rows.append(_spaced([first[count] for count in sorted(first)], across=True))
+    return encode_png(_spaced(rows, across=False))
+
+
+def _spaced(pictures: list[Float32Array], across: bool) -> Float32Array:
+    """Pictures beside or below each other, with white between them; a shorter row ends in white."""
+    widest = max(picture.shape[1] for picture in pictures)
+    spaced: list[Float32Array] = []
+    for picture in pictures:
+        if not across:
+            picture = np.pad(picture, ((0, 0), (0, widest - picture.shape[1]), (0, 0)), constant_values=1)
+        spaced += [picture, _gutter(picture.shape[0 if across else 1], not across)]
+    return np.concatenate(spaced[:-1], axis=1 if across else 0)
+
+
+def _gutter(length: int, across: bool) -> Float32Array:
+    return np.ones((GUTTER, length, 3) if across else (length, GUTTER, 3), np.float32)
+
+
+def page(found: dict[str, list[Result]], command: str, figures: dict[str, str]) -> str:
+    """The whole of it in Markdown."""
+    parts = ["# Known scenes found again", f"    {command}", ABOUT.format(side=SIDE)]
+    for tool, results in found.items():
+        parts += [f"## {tool}", "\n".join(table(results))]
+        parts.append(f"![The first of each: the true picture above, what was found below]({figures[tool]})")
+    return "\n\n".join(parts) + "\n"
+
+
+ABOUT = """Pictures of {side} × {side} pixels, made by code from so many circles, ellipses, boxes and triangles, \
+upright and turned, opaque and translucent, some with a hole. Those of even seeds are sharp and drawn by resvg; \
+in those of odd seeds about half of the shapes have soft edges, and they are drawn by samples in numpy: no \
+renderer of this program has a part in it. `apart`: no two touch; `overlap`: every second lies on others, and at \
+least 60 % of each is not hidden.
+
+Found / true: shapes found for each one that there is (layers, or elements of an SVG but for a background; of a \
+flat picture, one more than were found), the median and the 90th percentile. PSNR: the median, the worst, how \
+many have enough. F1: of shapes found again, those of all scenes together: of the same kind, and covering the \
+same visible pixels with an IoU of at least 0.75, one for one; then the same without regard to the kind, for a \
+tool that draws paths. A hole is judged by its pixels. Seconds are the median of user and system time. `truth` \
+is the true shapes as this program draws them: what PSNR the antialiasing leaves. The rules are in \
+`sdf2vec/bench/recovery.py`; `--pictures FOLDER` and `--svg FOLDER` put any tool to the same test."""
+
+
+# --- the command --------------------------------------------------------------------------------------------
+
+
+def arguments() -> argparse.Namespace:
+    """What the command is asked for."""
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
+    parser.add_argument("--shapes", choices=("auto", "true"), default="auto", help="what a fit is told")
+    parser.add_argument("--tool", action="append", choices=tuple(TOOLS), help="several may be given")
+    parser.add_argument("--svg", type=Path, metavar="FOLDER", help="judge these files, as the tool `files`")
+    parser.add_argument(
+        "--pictures", type=Path, metavar="FOLDER", help="write the pictures there, fit nothing"
+    )
+    parser.add_argument("--seeds", type=int, default=SEEDS)
+    parser.add_argument("--counts", default=",".join(map(str, COUNTS)), help="how many shapes there are")
+    parser.add_argument("--modes", default=",".join(MODES))
+    parser.add_argument("--kind", help="of a fit")
+    parser.add_argument("--preset", help="of a fit")
+    parser.add_argument("--cuts", type=int, default=0, help="of a fit")
+    parser.add_argument("-o", "--output", type=Path)
+    options = parser.parse_args()
+    options.tool = options.tool or (["files"] if options.svg else ["sdf2vec"])
+    if "files" in options.tool and not options.svg:
+        parser.error("the tool `files` needs --svg FOLDER")
+    return options
+
+
+def _command(options: argparse.Namespace) -> str:
+    """How to do it again."""
+    words = [f"--shapes {options.shapes}"] + [f"--tool {tool}" for tool in options.tool]
+    plain = {name: getattr(options, name) for name in ("kind", "preset", "cuts")}
+    words += [f"--{name} {value}" for name, value in plain.items() if value]
+    return f"python -m sdf2vec.bench.known {' '.join(words)} --seeds {options.seeds} -o {options.output.as_posix()}"
+
+
+def main() -> None:
+    """Entry point of `python -m sdf2vec.bench.known`."""
+    options = arguments()
+    counts = [int(count) for count in options.counts.split(",")]
+    found: dict[str, list[Result]] = {tool: [] for tool in options.tool}
+    for seed in range(options.seeds):  # written after each: it takes long
+        cases = [Case(mode, count, seed) for mode, count in product(options.modes.split(","), counts)]
+        if options.pictures:
+            for case in cases:
+                write_atomically(options.pictures / f"{case.name}.png", encode_png(case.known.pixels))
+            continue
+        for case in cases:
+            known = case.known
+            for tool in options.tool:
+                found[tool].append(result(tool, case, known, options))
+        if options.output:
+            _write(found, options)
+    if not options.pictures and not options.output:
+        for tool, results in found.items():
+            print(f"{tool}\n", *table(results), sep="\n")
+
+
+def _write(found: dict[str, list[Result]], options: argparse.Namespace) -> None:
+    """The page, and the figures beside it."""
+    page_path: Path = options.output
+    figures = {tool: page_path.with_suffix(f".{tool}.png") for tool in found}
+    for tool, path in figures.items():
+        write_atomically(path, figure(found[tool]))
+    names = {tool: path.name for tool, path in figures.items()}
+    write_atomically(page_path, page(found, _command(options), names).encode())
+
+
+if __name__ == "__main__":
+    main()

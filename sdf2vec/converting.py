@@ -1,0 +1,197 @@
+"""One picture after another: read, fitted, exported, written. What is heavy is imported when first needed."""
+
+from __future__ import annotations
+
+import gzip
+import os
+import sys
+import time
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, BinaryIO
+
+from msgspec.structs import replace
+
+from . import api, guard
+from .deferred import deferred
+from .errors import Sdf2vecError
+from .export import EXPORTERS
+from .export.exported import Exported
+from .export.options import Options
+from .exports import Exports
+from .files import one_line, shown_as, write_atomically
+from .outputs import STREAM, Job, beside_of, stem_of
+from .progress import Stop, Teller
+from .running import Running
+from .scene import Scene
+from .scene_file import FORMAT
+
+if TYPE_CHECKING:
+    from .fit.loop import Progress
+    from .image import Picture
+    from .quality import Quality
+    from .roundtrip import Check
+
+load_picture: Callable[[Any], Picture] = deferred("sdf2vec.image", "load")
+encode_png: Callable[[Any], bytes] = deferred("sdf2vec.image", "encode_png")
+quality_of: Callable[[Scene, Picture], Quality] = deferred("sdf2vec.quality", "quality")
+figure: Callable[..., Check | None] = deferred("sdf2vec.roundtrip", "figure")
+
+
+@dataclass(frozen=True)
+class Work:
+    """What is done with every picture: the options given for the fit, those of exports, those of the run."""
+
+    fit: Mapping[str, Any]
+    export: Options
+    running: Running
+
+
+@dataclass(frozen=True)
+class Done:
+    """What came of one picture."""
+
+    shapes: int
+    psnr: float  # dB
+    flip: float
+    bytes: int  # of all files
+    seconds: float  # for all of it
+    stopped: bool
+
+
+def convert(job: Job, work: Work, teller: Teller, stop: Stop) -> Done:
+    """Fits one picture and writes its exports. Raises Sdf2vecError."""
+    started = time.perf_counter()
+    with teller.phase("read"):
+        picture = _read_picture(job.source)
+    for note in picture.notes:
+        teller.say(note)
+    fitting = time.perf_counter()
+    with teller.phase("fit"):
+        scene = _fit(picture, work, teller, stop)
+    seconds = time.perf_counter() - fitting
+    with teller.phase("measure"):
+        quality = quality_of(scene, picture)
+    early = ", stopped early" if stop.requested else ""
+    size = f"{picture.width} x {picture.height}"
+    near = _described(quality, picture)
+    teller.say(
+        f"{_name(job.source)}: {size}, {scene.shape_count} shapes, {near}, fitted in {seconds:.1f} s{early}"
+    )
+    original = _original(job.source, picture) if work.running.with_original else None
+    written = write_exports(scene, job, replace(work.export, original=original), teller)
+    seconds = time.perf_counter() - started
+    teller.say(f"  {seconds:.1f} s in all{_phases(teller)}")
+    return Done(scene.shape_count, quality.psnr, quality.flip, written, seconds, stop.requested)
+
+
+def _phases(teller: Teller) -> str:
+    return f": {teller.about_phases()}" if teller.running.verbose else ""
+
+
+def _described(quality: Quality, picture: Picture) -> str:
+    psnr, flip, (width, height) = quality
+    where = "" if (width, height) == (picture.width, picture.height) else f" at {width} x {height}"
+    return f"PSNR {psnr:.2f} dB, FLIP {flip:.4f}{where}"
+
+
+def _fit(picture: Picture, work: Work, teller: Teller, stop: Stop) -> Scene:
+    def callback(progress: Progress) -> bool:
+        teller.step(progress)
+        return stop.requested
+
+    return api.fit(picture, callback=callback, **work.fit)
+
+
+def _read_picture(source: str) -> Picture:
+    if source == STREAM:
+        return load_picture(standard_input())
+    try:
+        return load_picture(source)
+    except Sdf2vecError:
+        if _is_scene(source):
+            shown = one_line(source)
+            raise Sdf2vecError(f"{shown}: is a scene, not a picture; sdf2vec export {shown}") from None
+        raise
+
+
+def _original(source: str, picture: Picture) -> bytes:
+    """The file's own bytes where a browser shows what was read of it, else a PNG of that."""
+    data = Path(source).read_bytes() if os.path.isfile(source) else b""  # a stream is at its end
+    return data if shown_as(data) else encode_png(picture.pixels)
+
+
+def _is_scene(path: str) -> bool:
+    try:
+        with open(path, "rb") as stream:
+            return f'"{FORMAT}"'.encode() in stream.read(200)
+    except OSError:
+        return False
+
+
+def standard_input() -> BinaryIO:
+    """Standard input as bytes. Raises Sdf2vecError where there is none."""
+    if sys.stdin is None:
+        raise Sdf2vecError("standard input: is closed")
+    return sys.stdin.buffer
+
+
+def _name(source: str) -> str:
+    return "standard input" if source == STREAM else source
+
+
+# --- exports --------------------------------------------------------------------------------------------------
+
+
+def write_exports(scene: Scene, job: Job, options: Options, teller: Teller) -> int:
+    """Writes the exports of a scene, by default titled after the input; how many bytes there are in all."""
+    title = options.title or ("a picture" if job.source == STREAM else one_line(stem_of(job.source)))
+    exports, written = Exports(scene), 0
+    for target, path in job.outputs.items():
+        chosen = replace(options, title=title, alone=path == STREAM)
+        with teller.phase(f"export {target}"):
+            made = exports.export(target, chosen)
+        _write(path, made.raw)
+        written += len(made.raw)
+        if path != STREAM:
+            with teller.phase(f"check {target}"):
+                near = _figure(scene, target, made, chosen) if teller.running.check == "auto" else ""
+            teller.say(f"  {path}: {len(made.raw):,} bytes{_packed(target, made.raw)}{near}")
+            written += _write_beside(path, EXPORTERS[target].suffix, made.beside, teller)
+        for note in made.notes:
+            teller.say(f"  {note}")
+    return written
+
+
+def _write_beside(path: str, suffix: str, files: Mapping[str, bytes], teller: Teller) -> int:
+    """Files that belong to an export, named after it."""
+    for ending, data in files.items():
+        place = beside_of(path, suffix, ending)
+        write_atomically(place, data)
+        teller.say(f"  {place}: {len(data):,} bytes")
+    return sum(map(len, files.values()))
+
+
+def _packed(target: str, data: bytes) -> str:
+    """The size that a web server would send an SVG with."""
+    return f" ({len(gzip.compress(data, 9, mtime=0)):,} gzipped)" if target == "svg" else ""
+
+
+def _write(path: str, data: bytes) -> None:
+    if path == STREAM:
+        guard.write_output(data)
+    else:
+        write_atomically(path, data)
+
+
+def _figure(scene: Scene, target: str, made: Exported, options: Options) -> str:
+    """How near the export comes to the render, where an engine can tell; at the fitted size."""
+    try:
+        result = figure(scene, target, made, options)
+    except Sdf2vecError as error:
+        return f"; not checked: {one_line(str(error))}"
+    if result is None:
+        return ""
+    worst = f"{result.largest_error:.0f}" if result.largest_error >= 10 else f"{result.largest_error:.2g}"
+    return f"; {result.engine} draws it at {result.psnr:.1f} dB, largest error {worst} levels"

@@ -1,0 +1,106 @@
+"""Where each number of a packed scene is in its bits, and the bits as words."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass, replace
+
+from ..paints import PAINTS
+from ..shapes import KINDS
+from ..units import Parameter
+from .layouts import WORD
+from .records import Variant
+
+CELL_BITS = 4
+CHOICE_BITS = 3  # say how many more bits than the least a layer's fractions have
+COUNT_BITS = 7  # of the number of shapes in a layer
+PLACE = "place"  # the precision of what lies in a layer's box: bits by how sharp its edge is
+AHEAD = 4  # words that a shader may read beyond a shape
+
+
+@dataclass(frozen=True)
+class Precision:
+    """Bits of each field. `places` is how finely positions are said: −log2 of the step, in falloffs."""
+
+    places: float = 4.0
+    falloff: int = 8
+    color: int = 7
+    opacity: int = 7
+
+    def finer(self, field: str, steps: float = 1) -> Precision:
+        return replace(self, **{field: getattr(self, field) + steps})
+
+
+def by_precision(parameters: Iterable[Parameter]) -> list[Parameter]:
+    """Parameters in the order in which a packed shape has them: those of a precision of their own first."""
+    return sorted(parameters, key=lambda parameter: parameter.unit.codec.precision == PLACE)
+
+
+@dataclass(frozen=True)
+class Layout:
+    """Where the numbers of a packed layer are.
+
+    A layer is: its box of cells, bits more than the least, variant (or with joins: number of shapes), falloff,
+    opacity; then its shapes: (variant, join, smoothness,) colours, places. With joins all shapes of a layer are as
+    long as the longest could be.
+    """
+
+    variants: tuple[Variant, ...]
+    joins: tuple[str, ...]
+
+    @property
+    def variant_bits(self) -> int:
+        return (len(self.variants) - 1).bit_length() if self.variants else 0
+
+    @property
+    def join_bits(self) -> int:
+        return (len(self.joins) - 1).bit_length() if self.joins else 0
+
+    @property
+    def head(self) -> int:
+        """Bits before the falloff."""
+        return 4 * CELL_BITS + CHOICE_BITS + (COUNT_BITS if self.joins else self.variant_bits)
+
+    def before_shapes(self, precision: Precision) -> int:
+        """Bits before the first shape."""
+        return self.head + precision.falloff + precision.opacity
+
+    def before_numbers(self, precision: Precision) -> int:
+        """Bits of a shape before its colours."""
+        return self.variant_bits + self.join_bits + precision.falloff if self.joins else 0
+
+    def counts(self, variant: Variant) -> tuple[int, int]:
+        """How many fractions of a shape have the colours' precision, and how many that of places."""
+        parameters = (*PAINTS[variant.paint].parameters, *KINDS[variant.kind].parameters)
+        places = sum(p.width for p in parameters if p.unit.codec.precision == PLACE)
+        return sum(p.width for p in parameters) - places, places
+
+    def most(self) -> tuple[int, int]:
+        """The most of either that any variant has."""
+        counts = [self.counts(variant) for variant in self.variants]
+        return max((c for c, _ in counts), default=0), max((p for _, p in counts), default=1)
+
+    def longest(self, precision: Precision, count: int) -> int:
+        """Bits of the longest shape whose places have so many."""
+        colors, places = self.most()
+        return self.before_numbers(precision) + colors * precision.color + places * count
+
+
+class Stream:
+    """Bits one after another, as words."""
+
+    def __init__(self) -> None:
+        self._value = 0
+        self.bits = 0
+
+    def put(self, value: int, bits: int) -> None:
+        assert 0 <= value < 1 << bits, f"{value} has more than {bits} bits"
+        self._value |= value << self.bits
+        self.bits += bits
+
+    def words(self, ahead: int) -> tuple[int, ...]:
+        """All words, and so many empty ones that a shader may read ahead."""
+        count = -(-self.bits // WORD) + ahead
+        raw = self._value
+        mask = (1 << WORD) - 1
+        return tuple((raw >> (WORD * i)) & mask for i in range(count))

@@ -1,0 +1,10 @@
+"""Where the program starts: Ctrl-C ends it without a word while its modules are still being imported."""
+
+import signal
+
+signal.signal(signal.SIGINT, signal.SIG_DFL)
+
+from sdf2vec.cli import main  # noqa: E402 (see above)
+
+if __name__ == "__main__":
+    main()

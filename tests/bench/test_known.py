@@ -1,0 +1,111 @@
+"""The command: its table, its figure, other tools' files."""
+
+import io
+import sys
+
+import numpy as np
+import pytest
+from PIL import Image
+
+from sdf2vec import Scene, Sdf2vecError, api
+from sdf2vec.bench import known
+from sdf2vec.bench.known import Case, Result
+from sdf2vec.bench.known_drawing import svg_of
+from sdf2vec.bench.recovery import Verdict
+
+
+@pytest.fixture
+def command(monkeypatch):
+    """Runs the command with these words."""
+
+    def run(*words):
+        monkeypatch.setattr(sys, "argv", ["known", *map(str, words)])
+        known.main()
+
+    return run
+
+
+def test_a_row_by_hand():
+    """Ratios 1, 1, 1, 2: the 90th percentile lies between the last two. F1 is 2 · 7 / (8 + 10)."""
+    good, more = Verdict(2, 2, 2, 2, 50.0, 1.0), Verdict(2, 4, 1, 2, 30.0, 5.0)
+    cells = known.row("apart", "2", [good, good, good, more]).strip("| ").split(" | ")
+    assert cells == ["apart", "2", "4", "1.00", "1.70", "50.0", "30.0", "75 %", "0.778", "0.889", "1.0"]
+
+
+def result(mode, true, seed, value):
+    return Result(
+        Case(mode, true, seed), Verdict(true, true, true, true, 50, 0), np.full((5, 2, 3), value, np.float32)
+    )
+
+
+def test_a_row_for_each_mode_and_number_then_sums():
+    results = [result("apart", 1, 0, 0), result("apart", 1, 1, 0), result("overlap", 4, 0, 0)]
+    rows = [line.split(" | ")[:3] for line in known.table(results)][2:]
+    assert rows == [
+        ["| apart", "1", "2"],
+        ["| overlap", "4", "1"],
+        ["| apart, sharp", "all", "1"],
+        ["| apart, soft", "all", "1"],
+        ["| **apart**", "all", "2"],
+        ["| overlap, sharp", "all", "1"],
+        ["| **overlap**", "all", "1"],
+    ]
+
+
+def test_the_figure_holds_the_first_of_each():
+    """Two columns and two rows, of which the second has one picture; what is missing is white."""
+    results = [
+        result("apart", 1, 0, 0.0),
+        result("apart", 2, 0, 0.2),
+        result("apart", 1, 2, 0.4),
+        result("overlap", 1, 0, 0.6),
+    ]
+    pixels = np.asarray(Image.open(io.BytesIO(known.figure(results))))
+    assert pixels.shape == (5 + 3 + 5, 2 + 3 + 2, 3)
+    assert [pixels[0, 0, 0], pixels[0, 6, 0], pixels[12, 0, 0], pixels[12, 6, 0]] == [0, 51, 153, 255]
+
+
+def test_the_command_writes_a_page_and_its_figure(require_engine, command, tmp_path):
+    require_engine("resvg")
+    output = tmp_path / "known.md"
+    command("--tool", "truth", "--seeds", 2, "--counts", "0,2", "-o", output)
+    text = output.read_text()
+    assert f"python -m sdf2vec.bench.known --shapes auto --tool truth --seeds 2 -o {output}" in text
+    rows = [line.split(" | ") for line in text.splitlines() if line.startswith("| **")]
+    assert [(row[0], row[3], row[8], row[9]) for row in rows] == [
+        ("| **apart**", "1.00", "1.000", "1.000"),
+        ("| **overlap**", "1.00", "1.000", "1.000"),
+    ]
+    assert "(known.truth.png)" in text
+    assert (tmp_path / "known.truth.png").read_bytes().startswith(b"\x89PNG")
+
+
+def test_another_tools_files(require_engine, command, tmp_path, capsys):
+    """The pictures are written; SVG files of the same names are judged, and one that is missing is named."""
+    require_engine("resvg")
+    command("--pictures", tmp_path, "--seeds", 1, "--counts", 2, "--modes", "apart")
+    (picture,) = tmp_path.iterdir()
+    case = Case("apart", 2, 0)
+    assert picture.name == "apart-02-00.png"
+    np.testing.assert_allclose(np.asarray(Image.open(picture)) / 255, case.known.pixels, atol=1e-6)
+    picture.with_suffix(".svg").write_text(svg_of(case.known))
+    command("--svg", tmp_path, "--seeds", 1, "--counts", 2, "--modes", "apart")
+    assert "files, apart-02-00: 2 of 2 shapes, 2 right, 2 outlines, 99.0 dB" in capsys.readouterr().out
+    with pytest.raises(Sdf2vecError, match=r"apart-01-00\.svg: No such file"):
+        command("--svg", tmp_path, "--seeds", 1, "--counts", 1, "--modes", "apart")
+
+
+@pytest.mark.parametrize(("words", "told"), [((), "auto"), (("--shapes", "true"), 2)])
+def test_what_a_fit_is_told(monkeypatch, command, capsys, words, told):
+    """Nothing, or how many shapes there are and of which kinds; its seed is the scene's."""
+    asked = []
+
+    def fit(picture, shapes, **options):
+        asked.append((shapes, options))
+        return Scene(picture.width, picture.height, ())
+
+    monkeypatch.setattr(api, "fit", fit)
+    command(*words, "--seeds", 1, "--counts", 2, "--modes", "apart", "--preset", "fast")
+    kind = {} if told == "auto" else {"kind": known.KINDS}
+    assert asked == [(told, {"seed": 0, "preset": "fast"} | kind)]
+    assert "sdf2vec, apart-02-00: 0 of 2 shapes" in capsys.readouterr().out

@@ -1,0 +1,49 @@
+"""The bar: what it says of a fit, of kernels that are compiled, of exports."""
+
+import io
+import math
+import re
+import sys
+
+from sdf2vec.fit.loop import Progress
+from sdf2vec.progress import telling
+from sdf2vec.running import Running
+
+
+def terminal(monkeypatch):
+    """Makes stderr a terminal, from now on; what it shows."""
+    stream = io.StringIO()
+    stream.isatty = lambda: True  # type: ignore[method-assign]
+    monkeypatch.setattr(sys, "stderr", stream)
+    monkeypatch.setenv("TERM", "xterm")
+    monkeypatch.setenv("COLUMNS", "100")
+    return stream
+
+
+def test_the_bar_names_every_phase_and_never_a_number_that_is_none(monkeypatch, capsys):
+    stream = terminal(monkeypatch)
+    with telling(Running()) as teller:
+        with teller.phase("fit"):
+            teller.step(Progress("compiling kernels (once)", 0, 90, math.nan))
+            teller.bar.refresh()
+            teller.step(Progress("coarse", 7, 90, 0.25))
+            teller.bar.refresh()
+        for name in ("export svg", "check svg"):
+            with teller.phase(name):
+                teller.bar.refresh()
+            teller.say(f"done: {name}")
+    shown = re.sub(r"\x1b\[[0-9;?]*[A-Za-z]", "", stream.getvalue())
+    assert re.search(r"coarse on cpu .*step 7/90  loss 0\.25000", shown)
+    for word in ("compiling kernels (once) on cpu", "export svg", "check svg"):
+        assert word in shown
+    assert "nan" not in shown
+    assert capsys.readouterr().out == "done: export svg\ndone: check svg\n"
+    assert set(teller.seconds) == {"fit", "export svg", "check svg"}
+
+
+def test_a_quiet_run_has_no_bar(monkeypatch, capsys):
+    stream = terminal(monkeypatch)
+    with telling(Running(quiet=True)) as teller, teller.phase("fit"):
+        teller.say("nothing")
+        teller.step(Progress("coarse", 7, 90, 0.25))
+    assert stream.getvalue() + capsys.readouterr().out == ""

@@ -1,0 +1,1 @@
+"""Everything valid and much that is not, at random: see `python -m tests.fuzz --help`."""

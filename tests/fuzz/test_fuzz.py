@@ -1,0 +1,32 @@
+"""Half a minute of the attacks, and what has failed before: see `python -m tests.fuzz`."""
+
+import time
+
+import pytest
+
+import sdf2vec
+from tests.fuzz import domain
+from tests.fuzz.attacks import ATTACKS, attempt
+
+SHARES = {"pictures": (2000, 6.0), "arrays": (500, 2.0), "scenes": (60, 20.0), "options": (1000, 2.0)}
+"""How many seeds, and after how many seconds no further one is begun."""
+
+FAILED = [(0, "svg"), (3, "svg")]
+"""Kept: seeds of scenes that an export has failed at."""
+
+
+@pytest.mark.filterwarnings("ignore::RuntimeWarning")
+@pytest.mark.parametrize("name", ATTACKS)
+def test_attacks(name):
+    count, seconds = SHARES[name]
+    end = time.monotonic() + seconds
+    for seed in range(count):
+        assert attempt(name, seed) == ""
+        if time.monotonic() > end:
+            break
+
+
+@pytest.mark.filterwarnings("ignore::RuntimeWarning")
+@pytest.mark.parametrize(("seed", "target"), FAILED)
+def test_what_has_failed_before(seed, target):
+    assert sdf2vec.export(domain.scene(seed, 3, 5, "over"), target)
