@@ -10,7 +10,7 @@ import sdf2vec.export
 import sdf2vec.fit
 import sdf2vec.render  # noqa: F401 (see above)
 
-from .api import check, export, exported, fit, render
+from .api import check, export, exported, fit, fitted, render
 from .errors import Sdf2vecError
 from .export.exported import Exported
 from .scene import Joint, Layer, Scene, SceneError, Shape
@@ -33,6 +33,7 @@ __all__ = [
     "export",
     "exported",
     "fit",
+    "fitted",
     "load",
     "loads",
     "render",

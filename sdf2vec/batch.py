@@ -23,7 +23,7 @@ from .guard import Problem
 from .limits import THREADS
 from .outputs import STREAM, Job
 from .progress import Stop, Teller, telling
-from .report import BUG, FAILED, OK, SKIPPED, STOPPED, Report, Row
+from .report import BUG, FAILED, MISSED, OK, SKIPPED, STOPPED, Report, Row
 
 PICTURES = (".png", ".jpg", ".jpeg", ".webp", ".avif", ".tif", ".tiff", ".gif", ".bmp")
 LISTED = 10  # pictures that a line names
@@ -101,7 +101,12 @@ class Batch:
         for job in self.jobs:
             there = STREAM not in job.outputs.values() and all(map(os.path.exists, job.outputs.values()))
             before = self.report.rows.get(job.source)
-            if there and before and before.status == OK and before.settings == self.settings_of(job):
+            if (
+                there
+                and before
+                and before.status in (OK, MISSED)
+                and before.settings == self.settings_of(job)
+            ):
                 self.rows[job.source] = before
             elif there and self.work.running.skip_existing:
                 self._take(Row(job.source, SKIPPED))
@@ -122,7 +127,7 @@ class Batch:
     def done(self, job: Job, done: Done) -> None:
         """Takes up what came of a picture."""
         psnr = done.psnr if math.isfinite(done.psnr) else None
-        status = STOPPED if done.stopped else OK
+        status = STOPPED if done.stopped else OK if done.met else MISSED
         numbers = (done.shapes, psnr, done.flip, done.bytes, round(done.seconds, 3))
         self._take(Row(job.source, status, *numbers, settings=self.settings_of(job)))
 
@@ -256,7 +261,8 @@ def _converted(job: Job, work: Work) -> tuple[Done | Problem, list[str]]:
 
 def about(batch: Batch) -> str:
     """One line on all pictures."""
-    counts = {"done": batch.count(OK) + batch.count(STOPPED)}
+    counts = {"done": batch.count(OK) + batch.count(STOPPED) + batch.count(MISSED)}
+    counts |= {"of them short of the target": batch.count(MISSED)}
     counts |= {status: batch.count(status) for status in (SKIPPED, FAILED)}
     counts |= {"failed by a bug": batch.count(BUG), "not begun": len(batch.left())}
     told = ", ".join(f"{count} {name}" for name, count in counts.items() if count or name == "done")
@@ -264,8 +270,10 @@ def about(batch: Batch) -> str:
 
 
 def exit_status(batch: Batch) -> int:
-    """0, 2 where nothing could be done, 3 where some pictures failed; more than that for what is graver."""
-    worst = max((problem.status for problem in batch.problems), default=guard.OK)
+    """0, 2 where nothing could be done, 3 where some pictures failed, 4 where a target was missed; more than that for
+    what is graver."""
+    missed = guard.MISSED if batch.count(MISSED) else guard.OK
+    worst = max((problem.status for problem in batch.problems), default=missed)
     return guard.PARTLY if worst == guard.FAILED and len(batch.problems) < len(batch.jobs) else worst
 
 

@@ -72,7 +72,8 @@ def _convert_parser() -> argparse.ArgumentParser:
         usage="sdf2vec INPUT... [--emit TARGETS] [-o OUT] [options]",
         description="Fits a few soft geometric shapes to pictures and exports them as mathematics.",
         epilog="Other commands, each with its own --help: sdf2vec check | render | export | cache. "
-        "--traceback shows where an error that is a bug came from.",
+        "--traceback shows where an error that is a bug came from. Exit status: 0; 2 for what you can mend, 3 where "
+        "only some pictures failed, 4 where a target was not reached (the nearest is written), 70 for a bug.",
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
     parser.add_argument(
@@ -156,7 +157,7 @@ def _check_settings(work: Work, places: Places) -> None:
     exports = Exports(Scene(1, 1, (), compositing=settings.compositing))
     for target in places.targets:
         options = replace(work.export, svg_size_limit=None, alone=places.files.get(target) == STREAM)
-        EXPORTERS[target].check_count(settings.shapes, options)
+        EXPORTERS[target].check_count(settings.most, options)
         exports.export(target, options)
 
 

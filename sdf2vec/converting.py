@@ -28,6 +28,7 @@ from .scene import Scene
 from .scene_file import FORMAT
 
 if TYPE_CHECKING:
+    from .fit.auto import Fitted
     from .fit.loop import Progress
     from .image import Picture
     from .quality import Quality
@@ -58,6 +59,7 @@ class Done:
     bytes: int  # of all files
     seconds: float  # for all of it
     stopped: bool
+    met: bool = True  # any target
 
 
 def convert(job: Job, work: Work, teller: Teller, stop: Stop) -> Done:
@@ -69,7 +71,8 @@ def convert(job: Job, work: Work, teller: Teller, stop: Stop) -> Done:
         teller.say(note)
     fitting = time.perf_counter()
     with teller.phase("fit"):
-        scene = _fit(picture, work, teller, stop)
+        fitted = _fit(picture, work, teller, stop)
+        scene = fitted.scene
     seconds = time.perf_counter() - fitting
     with teller.phase("measure"):
         quality = quality_of(scene, picture)
@@ -79,11 +82,13 @@ def convert(job: Job, work: Work, teller: Teller, stop: Stop) -> Done:
     teller.say(
         f"{_name(job.source)}: {size}, {scene.shape_count} shapes, {near}, fitted in {seconds:.1f} s{early}"
     )
+    if fitted.reason:
+        teller.say(f"  {fitted.reason}")
     original = _original(job.source, picture) if work.running.with_original else None
     written = write_exports(scene, job, replace(work.export, original=original), teller)
     seconds = time.perf_counter() - started
     teller.say(f"  {seconds:.1f} s in all{_phases(teller)}")
-    return Done(scene.shape_count, quality.psnr, quality.flip, written, seconds, stop.requested)
+    return Done(scene.shape_count, quality.psnr, quality.flip, written, seconds, stop.requested, fitted.met)
 
 
 def _phases(teller: Teller) -> str:
@@ -96,12 +101,12 @@ def _described(quality: Quality, picture: Picture) -> str:
     return f"PSNR {psnr:.2f} dB, FLIP {flip:.4f}{where}"
 
 
-def _fit(picture: Picture, work: Work, teller: Teller, stop: Stop) -> Scene:
+def _fit(picture: Picture, work: Work, teller: Teller, stop: Stop) -> Fitted:
     def callback(progress: Progress) -> bool:
         teller.step(progress)
         return stop.requested
 
-    return api.fit(picture, callback=callback, **work.fit)
+    return api.fitted(picture, callback=callback, **work.fit)
 
 
 def _read_picture(source: str) -> Picture:

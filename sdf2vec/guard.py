@@ -14,7 +14,7 @@ from typing import Any, NoReturn, TextIO
 from .errors import Sdf2vecError, Sdf2vecWarning
 from .files import one_line
 
-OK, FAILED, PARTLY, BUG = 0, 2, 3, 70
+OK, FAILED, PARTLY, MISSED, BUG = 0, 2, 3, 4, 70
 SIGNALLED = 128  # plus the signal's number
 INTERRUPTED, UNREAD = (
     SIGNALLED + signal.SIGINT,

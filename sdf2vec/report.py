@@ -15,7 +15,7 @@ from typing import Any
 from .errors import Sdf2vecError
 from .files import one_line, require_writable, write_atomically
 
-OK, SKIPPED, STOPPED, FAILED, BUG = "ok", "skipped", "stopped", "failed", "bug"
+OK, SKIPPED, STOPPED, MISSED, FAILED, BUG = "ok", "skipped", "stopped", "missed", "failed", "bug"
 EVERY = 1.0  # seconds between two writings of a report, at least
 
 

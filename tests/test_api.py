@@ -37,7 +37,7 @@ def levels():
     return np.random.default_rng(0).integers(0, 256, (16, 24, 3), dtype=np.uint8)
 
 
-def fit(image, shapes=3, **settings):
+def fit(image, shapes=6, **settings):
     return sdf2vec.fit(image, shapes, preset="fast", **settings)
 
 
@@ -50,7 +50,7 @@ def test_a_picture_is_the_same_in_every_form(levels, tmp_path):
     path = tmp_path / "photo.png"
     Image.fromarray(levels).save(path)
     expected = fit(str(path))
-    assert expected.shape_count == 3
+    assert expected.shape_count == 6
     forms = [
         path,
         path.read_bytes(),
@@ -82,7 +82,7 @@ def test_settings_matter_and_defaults_are_said(levels):
     assert {layer.shapes[0].kind for layer in fit(levels, 12, kind="circle,box").layers} == {"circle", "box"}
     assert fit(levels, compositing="additive").compositing == "additive"
     assert fit(levels, loss="mse") != fit(levels, loss="l1")
-    assert settings_of().shapes == 256
+    assert settings_of().shapes == "auto"
 
 
 def test_names_of_kinds():
@@ -173,7 +173,7 @@ def test_the_callback_stops_the_fit(levels):
 
     scene = fit(levels, callback=stop_at_second)
     assert seen == [1, 2]
-    assert scene.shape_count == 3
+    assert scene.shape_count == 6
     assert scene != fit(levels)
 
 

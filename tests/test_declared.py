@@ -91,5 +91,5 @@ def test_documentation_has_a_line_for_each():
 def test_each_option_of_a_fit_and_an_export_has_a_flag_and_is_documented():
     flags = {action.dest for action in _convert_parser()._actions}
     assert flags >= set(options_of(Settings)) | set(options_of(Options)) - set(SET_HERE)
-    for function, record in ((api.fit, Settings), (api.exported, Options)):
+    for function, record in ((api.fitted, Settings), (api.exported, Options)):
         assert all(f"- `{name}`: " in (function.__doc__ or "") for name in options_of(record))

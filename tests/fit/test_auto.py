@@ -6,8 +6,7 @@ import numpy as np
 import pytest
 import torch
 
-from sdf2vec import Sdf2vecError, fit
-from sdf2vec.api import fitted
+from sdf2vec import Sdf2vecError, fit, fitted
 from sdf2vec.engines import resvg
 from sdf2vec.fit.auto import ground_of, is_flat
 from sdf2vec.fit.settings import settings_of

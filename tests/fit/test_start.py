@@ -39,7 +39,7 @@ def test_a_start_says_how_many_shapes():
     start = fitted(shapes=5)
     assert settings_of(start=start).shapes == 5
     assert settings_of(7, start=start).shapes == 7
-    assert settings_of(start=Scene(48, 32, ())).shapes == settings_of().shapes == 256
+    assert settings_of(start=Scene(48, 32, ())).shapes == settings_of().shapes == "auto"
 
 
 def test_a_fit_that_goes_on_leaves_the_first_phase_out():
