@@ -83,7 +83,7 @@ def _few(picture: Picture, settings: Settings, callback: Callback) -> Fitted | N
         if drawing.error <= (drawing.floor if settings.target_psnr else GOOD):
             return Fitted(found, _counted(found))
     painted = fit_picture(picture, _going_on(settings, found), callback)
-    as_wanted = settings.shapes in (AUTO, found.shape_count)
+    as_wanted = settings.shapes == AUTO or (settings.shapes == found.shape_count and settings.loss is None)
     return _told(_nearest([painted, *([found] if as_wanted else [])], picture), picture, settings)
 
 
@@ -95,6 +95,8 @@ def _nearest(scenes: Sequence[Scene], picture: Picture) -> Scene:
 
 def _told(scene: Scene, picture: Picture, settings: Settings) -> Fitted:
     """A scene with what there is to say of it."""
+    if settings.shapes != AUTO:
+        return Fitted(scene)
     if settings.target_psnr is None:
         return Fitted(scene, _counted(scene))
     met = _missed(quality(scene, picture), settings) <= 0

@@ -319,7 +319,8 @@ def test_a_transparent_picture(folder, run):
         assert rendered.mode == "RGBA"
         alpha = np.asarray(rendered)[..., 3]
     assert alpha[0, 0] < alpha.max()
-    assert "rect" not in (folder / "logo.svg").read_text()
+    assert 'width="100%"' not in (folder / "logo.svg").read_text()
+    assert 'width="24"' not in (folder / "logo.svg").read_text().partition("\n")[2]  # no ground
 
 
 @pytest.mark.parametrize(
