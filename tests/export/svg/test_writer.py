@@ -43,7 +43,7 @@ def test_the_whole_document():
     name = re.findall(r'id="(s[0-9a-f]{5})box-1"', text)[0]
     assert text == (
         '<svg height="100" role="img" viewBox="0 0 100 50" width="200" xmlns="http://www.w3.org/2000/svg">\n'
-        "<title>a &lt;title&gt;</title>\n"
+        "<title>a &lt;title&gt;</title><!-- Made with sdf2vec -->\n"
         f'<rect fill="#00f" height="10" id="{name}box-1" width="20" x="40" y="20"/>\n</svg>\n'
     )
 
