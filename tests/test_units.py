@@ -111,8 +111,8 @@ def decoded(unit: Unit, fraction: float, width: int = 1) -> list[float]:
         (units.DIRECTION, 2, [4.0, 4.0]),
         (units.COLOR, 3, [4.0, 4.0, 4.0]),
         (units.OPACITY, 1, [4.0]),
-        (units.FALLOFF, 1, [0.5]),  # the fourth power of a half
-        (units.SMOOTHNESS, 1, [0.5]),
+        (units.FALLOFF, 1, [((0.001 ** (1 / 16) + 8.001 ** (1 / 16)) / 2) ** 16 - 0.001]),
+        (units.SMOOTHNESS, 1, [((0.001 ** (1 / 16) + 8.001 ** (1 / 16)) / 2) ** 16 - 0.001]),
     ],
 )
 def test_half_of_every_codec(unit, width, wanted):
@@ -120,14 +120,16 @@ def test_half_of_every_codec(unit, width, wanted):
 
 
 @pytest.mark.parametrize("unit", UNITS, ids=[unit.name for unit in UNITS])
-def test_codecs_grow_by_the_power_that_they_say(unit):
+def test_the_roots_of_codecs_are_linear_in_the_fraction(unit):
     width = 2 if unit is units.POSITION else 1
     low, half, high = (decoded(unit, fraction, width)[0] for fraction in (0.0, 0.5, 1.0))
-    assert (half - low) / (high - low) == pytest.approx(0.5**unit.codec.power)
+    root, value = unit.codec.root, unit.codec.value
+    assert root(half) == pytest.approx((root(low) + root(high)) / 2)
+    assert value(root(half)) == pytest.approx(half)
 
 
 def test_grown_by_hand():
-    assert constant(scalarize(grown(const(0.1), const(10.0)))[0]) == pytest.approx(0.001)
+    assert constant(scalarize(grown(const(0.5)))[0]) == pytest.approx(1 / 65536 - 0.001)
 
 
 def test_a_parameter_is_as_wide_as_its_start():
