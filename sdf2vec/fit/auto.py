@@ -35,7 +35,7 @@ SEARCH, JOINT, LAST = 56, 128, 320  # pixels squared
 FEW = 4  # shapes that are placed by trial, also where their number is given
 LEVELS = 3.5 / 255  # by which pixels of one flat colour differ at most
 FLAT = 0.6  # share of pixels next to the same colour, of a drawing in flat colours
-DISCS, LEFT = 16, 0.2  # so many discs leave so much of a soft drawing's variance, and more of a photograph's
+DISCS, LEFT = 16, 0.15  # so many discs leave so much of a soft drawing's variance, and more of a photograph's
 DISC_RESOLUTION = 48
 UNLIKELY = 1.5  # of the most shapes: a picture that needs more is no drawing
 SOFT_MOST = 48  # shapes of a soft drawing
@@ -269,4 +269,5 @@ def _counted(scene: Scene) -> str:
     """How many shapes of which kinds."""
     kinds = Counter(shape.kind for layer in scene.layers for shape in layer.shapes)
     listed = ", ".join(f"{count} {kind}" for kind, count in kinds.most_common())
-    return f"{scene.shape_count} shapes" + (f" ({listed})" if listed else "")
+    shapes = "1 shape" if scene.shape_count == 1 else f"{scene.shape_count} shapes"
+    return shapes + (f" ({listed})" if listed else "")

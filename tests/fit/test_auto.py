@@ -61,7 +61,7 @@ def test_the_shapes_of_a_drawing_are_found(drawn, shapes, kinds, width):
     found = fitted(picture)
     assert kinds_of(found.scene) == kinds
     assert quality(found.scene, picture).psnr >= 40
-    assert found.reason.startswith(f"{len(kinds)} shapes")
+    assert found.reason.startswith(f"{len(kinds)} shape")
     assert found.met
 
 
