@@ -169,6 +169,8 @@ def descended(scene: SceneTensors, view: View, search: Search, phase: Phase) -> 
     """A copy of the scene after a phase of steps down the squared error, all numbers together."""
     scene = detached(scene)
     optimizer = adam_over(scene)
+    if not optimizer.moving:  # nothing on nothing
+        return scene
     with torch.enable_grad():
         for rate in phase.rates():
             optimizer.zero_grad()

@@ -49,12 +49,13 @@ def kinds_of(scene):
 @pytest.mark.parametrize(
     ("shapes", "kinds", "width"),
     [
+        ("", [], 96),
         (WHITE, [], 96),
         (WHITE + DISC, ["circle"], 96),
         (WHITE + UNDER + OVER + TRIANGLE, ["box", "circle", "triangle"], 110),
         (DISC + TRIANGLE, ["circle", "triangle"], 96),  # on nothing
     ],
-    ids=["nothing", "a disc", "three shapes, one partly hidden", "with alpha"],
+    ids=["nothing", "a ground", "a disc", "three shapes, one partly hidden", "with alpha"],
 )
 def test_the_shapes_of_a_drawing_are_found(drawn, shapes, kinds, width):
     picture = drawn(shapes, width)
