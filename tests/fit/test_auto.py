@@ -13,7 +13,6 @@ from sdf2vec.fit.settings import settings_of
 from sdf2vec.image import Picture, resize
 from sdf2vec.quality import quality
 from tests.fit.fitting import RED, remember
-from tests.fit.fitting import picture as soft_picture
 
 WHITE = '<rect width="100%" height="100%" fill="white"/>'
 DISC = '<circle cx="44" cy="50" r="24" fill="#d02040"/>'
@@ -138,8 +137,8 @@ def test_the_search_ends_when_told_and_keeps_what_it_has(drawn):
 
 
 def test_the_same_seed_finds_the_same(drawn):
-    picture = drawn(WHITE + DISC + TRIANGLE)
-    assert fit(picture, seed=1) == fit(picture, seed=1)
+    picture = drawn(WHITE + DISC)
+    assert fit(picture, kind="ellipse", seed=1) == fit(picture, kind="ellipse", seed=1)
 
 
 def test_drawings_are_told_from_photographs():
@@ -161,7 +160,11 @@ def test_the_ground_is_the_colour_that_dominates():
 
 
 def test_a_soft_picture_takes_few_shapes():
-    picture = soft_picture()
-    found = fitted(picture)
-    assert found.scene.shape_count <= 24
+    """A disc that is nearly all edge, under no formula of ours."""
+    y, x = np.mgrid[0:32, 0:48].astype(np.float32)
+    disc = np.clip((20 - np.hypot(x - 22, y - 15)) / 16, 0, 1)[..., None]
+    picture = Picture((np.float32(0.9) - disc * np.array([0.2, 0.6, 0.7], np.float32)).astype(np.float32))
+    found = fitted(picture, kind="circle")
+    assert not is_flat(picture)
+    assert found.scene.shape_count <= 8  # its edge is straight, ours a sigmoid
     assert quality(found.scene, picture).psnr >= 35
