@@ -134,7 +134,7 @@ def test_all_that_fails_is_another_exit_code_than_some(album, run):
 
 def test_interrupted_it_lists_what_is_not_done_and_keeps_its_report(album, run, monkeypatch):
     """Ctrl-C in the second of four fits: that one ends early, the third and fourth are named."""
-    fit = sdf2vec.api.fit
+    fit = sdf2vec.api.fitted
 
     def interrupted(picture, **options):
         if os.path.exists("out/a.scene.json"):
@@ -143,7 +143,7 @@ def test_interrupted_it_lists_what_is_not_done_and_keeps_its_report(album, run, 
 
     command = ("album", "--recursive", *SHORT, *JSON, "-o", "out", "--report", "r.jsonl")
     with monkeypatch.context() as patched:
-        patched.setattr("sdf2vec.api.fit", interrupted)
+        patched.setattr("sdf2vec.api.fitted", interrupted)
         outcome = run(*command)
     assert outcome.code == 130
     assert outcome.err == (
@@ -156,7 +156,7 @@ def test_interrupted_it_lists_what_is_not_done_and_keeps_its_report(album, run, 
 
 
 def test_interrupted_twice_it_still_says_what_is_not_done(album, capfd, monkeypatch):
-    monkeypatch.setattr("sdf2vec.api.fit", lambda *_, **__: (_ for _ in ()).throw(KeyboardInterrupt))
+    monkeypatch.setattr("sdf2vec.api.fitted", lambda *_, **__: (_ for _ in ()).throw(KeyboardInterrupt))
     with pytest.raises(SystemExit) as caught:
         main(["album", *SHORT, *JSON, "-o", "out"])
     assert caught.value.code == 130

@@ -132,7 +132,7 @@ def test_refusals_leave_nothing_behind(folder, run, arguments, words):
 
 
 def test_settings_are_refused_before_any_work(folder, run, monkeypatch):
-    monkeypatch.setattr("sdf2vec.api.fit", lambda *_, **__: pytest.fail("the fit began"))
+    monkeypatch.setattr("sdf2vec.api.fitted", lambda *_, **__: pytest.fail("the fit began"))
     for bad in (
         ["--emit", "eps"],
         ["--compositing", "additive", "--colors", "4"],
@@ -193,7 +193,7 @@ def test_closed_standard_input(folder, capfd, monkeypatch):
     ids=lambda item: " ".join(item)[:40],
 )
 def test_contradictions_are_named_before_any_work(folder, run, monkeypatch, arguments, words):
-    monkeypatch.setattr("sdf2vec.api.fit", lambda *_, **__: pytest.fail("the fit began"))
+    monkeypatch.setattr("sdf2vec.api.fitted", lambda *_, **__: pytest.fail("the fit began"))
     picture().save(folder / "other.jpg")
     (folder / "text").write_text("mine")
     before = names(folder)
@@ -239,7 +239,7 @@ def test_only_what_this_program_made_is_replaced(folder, run, target):
 
 
 def test_places_that_can_not_be_written_are_found_before_the_fit(folder, run, monkeypatch):
-    monkeypatch.setattr("sdf2vec.api.fit", lambda *_, **__: pytest.fail("the fit began"))
+    monkeypatch.setattr("sdf2vec.api.fitted", lambda *_, **__: pytest.fail("the fit began"))
     assert_refused(run("photo.jpg", *SHORT, "-o", f"{'long' * 99}.svg"), "cannot write it", "too long")
     if os.path.isdir("/proc/self/fd"):  # where the mode of a folder says more than is true
         assert_refused(run("photo.jpg", *SHORT, "-o", "/proc/self/fd/a.svg"), "/proc/self/fd/a.svg")
