@@ -28,7 +28,7 @@ demo: $(VENV)/.installed
 	$(BIN)/sdf2vec examples/coffee.png --shapes 64 --seed 0 --emit json,glsl,shadertoy,wgsl,svg,png -o out/demo
 
 test: engines $(VENV)/.installed-clients lint
-	$(BIN)/python -m pytest -n $(WORKERS) --dist worksteal
+	$(BIN)/python -m pytest -n $(WORKERS) --dist worksteal --durations=20
 
 lint: $(VENV)/.installed-test
 	$(BIN)/ruff check

@@ -6,7 +6,7 @@ from typing import NamedTuple
 import numpy as np
 from PIL import Image
 
-SHORT = ("--shapes", "3", "--preset", "fast")
+SHORT = ("--shapes", "5", "--preset", "fast")
 ALL = "glsl,shadertoy,wgsl,svg,json,png"
 OUTPUTS = ["glsl", "render.png", "scene.json", "shadertoy.glsl", "svg", "wgsl"]
 

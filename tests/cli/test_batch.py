@@ -94,7 +94,7 @@ def test_a_report_has_a_line_for_every_picture(album, run, fits, form):
     assert [row["status"] for row in rows.values()] == ["ok", "ok", "failed"]
     assert "not a picture" in rows["album/bad.png"]["error"]
     good = rows["album/a.png"]
-    assert int(good["shapes"]) == sdf2vec.load("out/a.scene.json").shape_count == 3
+    assert int(good["shapes"]) == sdf2vec.load("out/a.scene.json").shape_count == 5
     assert int(good["bytes"]) == sum(os.path.getsize(f"out/a.{end}") for end in ("scene.json", "svg"))
     said = next(line for line in outcome.out.decode().splitlines() if line.startswith("album/a.png"))
     assert f"PSNR {float(good['psnr']):.2f} dB, FLIP {float(good['flip']):.4f}" in said

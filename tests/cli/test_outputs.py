@@ -26,11 +26,11 @@ def test_names_of_all_outputs(folder, run):
     assert outcome.err == ""
     assert names(folder) == sorted(["photo.jpg", *(f"photo.{suffix}" for suffix in OUTPUTS)])
     assert (folder / "photo.jpg").read_bytes() == before
-    assert (folder / "photo.glsl").read_text().startswith("#version 300 es\n// photo in 3 shapes")
+    assert (folder / "photo.glsl").read_text().startswith("#version 300 es\n// photo in 5 shapes")
     assert "mainImage" in (folder / "photo.shadertoy.glsl").read_text()
     assert "@fragment" in (folder / "photo.wgsl").read_text()
     assert ElementTree.parse(folder / "photo.svg").getroot().get("width") == "24"
-    assert sdf2vec.load(folder / "photo.scene.json").shape_count == 3
+    assert sdf2vec.load(folder / "photo.scene.json").shape_count == 5
     with Image.open(folder / "photo.render.png") as rendered:
         assert (rendered.size, rendered.mode) == ((24, 16), "RGB")
 
@@ -38,7 +38,7 @@ def test_names_of_all_outputs(folder, run):
 def test_the_summary_names_the_quality_and_every_file(folder, run):
     lines = run("photo.jpg", *SHORT, "--emit", "json", "--emit", "svg,png").out.decode().splitlines()
     assert re.fullmatch(
-        r"photo\.jpg: 24 x 16, 3 shapes, PSNR \d+\.\d\d dB, FLIP 0\.\d{4}, fitted in \d+\.\d s", lines[0]
+        r"photo\.jpg: 24 x 16, 5 shapes, PSNR \d+\.\d\d dB, FLIP 0\.\d{4}, fitted in \d+\.\d s", lines[0]
     )
     assert [line.split(":")[0] for line in lines[1:-1]] == [
         "  photo.scene.json",
@@ -208,7 +208,7 @@ def test_the_ending_of_an_output_says_what_it_is(folder, run):
     ElementTree.parse(folder / "a.svg")
     assert [Image.open(folder / name).format for name in ("b.JPG", "e.webp")] == ["JPEG", "WEBP"]
     assert "<!DOCTYPE html>" in (folder / "c.html").read_text()
-    assert sdf2vec.load(folder / "d.json").shape_count == 3
+    assert sdf2vec.load(folder / "d.json").shape_count == 5
     assert "mainImage" in (folder / "f.shadertoy.glsl").read_text()
     assert "@fragment" in (folder / "g.wgsl").read_text()
 
@@ -303,9 +303,9 @@ def test_thin_pictures(folder, run, size, kind):
 
 def test_a_large_picture(folder, run):
     Image.linear_gradient("L").resize((4000, 3000)).save(folder / "large.bmp")
-    outcome = run("large.bmp", *SHORT, "--shapes", "2", "--kind", "circle", "--emit", "json,svg")
+    outcome = run("large.bmp", *SHORT, "--shapes", "5", "--kind", "circle", "--emit", "json,svg")
     assert outcome.code == 0
-    assert outcome.out.startswith(b"large.bmp: 4000 x 3000, 2 shapes")
+    assert outcome.out.startswith(b"large.bmp: 4000 x 3000, 5 shapes")
     assert sdf2vec.load(folder / "large.scene.json").height == 3000
 
 
@@ -342,7 +342,7 @@ def test_unusual_pictures(folder, run, name, image, note):
     lines = outcome.out.decode().splitlines()
     if note:
         assert lines[0].startswith(f"{name}: {note}")
-    assert lines[-3].startswith(f"{name}: 24 x 16, 3 shapes")
+    assert lines[-3].startswith(f"{name}: 24 x 16, 5 shapes")
 
 
 def test_notes_stay_out_of_an_export_on_standard_output(folder, run):

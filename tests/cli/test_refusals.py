@@ -28,7 +28,7 @@ from tests.cli.command import SHORT, as_png, assert_refused, names, picture
         (["photo.jpg", "--compositing", "multiply"], ["unknown compositing 'multiply'", "additive"]),
         (["photo.jpg", "--glsl", "110"], ["unknown GLSL version '110'", "es300"]),
         (["photo.jpg", "--layout", "loose"], ["unknown layout 'loose'"]),
-        (["photo.jpg", "--union", "2"], ["3 shapes can't be joined by 2"]),
+        (["photo.jpg", "--union", "2"], ["5 shapes can't be joined by 2"]),
         (["photo.jpg", "--union", "two"], ["--union", "'two'"]),
         (["photo.jpg", "--weights", "text.png"], ["text.png", "not a picture"]),
         (["photo.jpg", "--weights", "missing.png"], ["missing.png", "no such file"]),
