@@ -132,10 +132,10 @@ def _target_of(out: str, asked: Sequence[str], known: Collection[str]) -> str:
             return taken[0]
         if fitting:
             raise Sdf2vecError(
-                f"{_shown(out)}: its ending says {_listed(list(fitting))}, --emit says {_listed(asked)}; "
+                f"{one_line(out)}: its ending says {_listed(list(fitting))}, --emit says {_listed(asked)}; "
                 "leave one of them out"
             )
-        raise Sdf2vecError(f"{_shown(out)}: which of {_listed(asked)} is it for? give it the ending of one")
+        raise Sdf2vecError(f"{one_line(out)}: which of {_listed(asked)} is it for? give it the ending of one")
     best = [target for target, size in fitting.items() if size == max(fitting.values())]
     usual = [target for target in best if name.endswith(EXPORTERS[target].suffix)]
     for choice in (best, usual):
@@ -143,7 +143,7 @@ def _target_of(out: str, asked: Sequence[str], known: Collection[str]) -> str:
             return choice[0]
     endings = ", ".join(dict.fromkeys(EXPORTERS[target].endings[-1] for target in known))
     raise Sdf2vecError(
-        f"{_shown(out)}: what is it to be? choose with --emit, or one of the endings {endings}"
+        f"{one_line(out)}: what is it to be? choose with --emit, or one of the endings {endings}"
     )
 
 
@@ -154,11 +154,7 @@ def _give(files: dict[str, str], target: str, out: str) -> None:
 
 
 def _listed(names: Sequence[str]) -> str:
-    return ", ".join(map(_shown, names))
-
-
-def _shown(name: str) -> str:
-    return one_line(name)
+    return ", ".join(map(one_line, names))
 
 
 def read_exports(paths: Iterable[str]) -> dict[str, Exported]:
@@ -167,7 +163,7 @@ def read_exports(paths: Iterable[str]) -> dict[str, Exported]:
     for path in paths:
         target = _target_of(path, (), EXPORTERS)
         if target in found:
-            raise Sdf2vecError(f"{_shown(path)}: a second {target}; check them apart")
+            raise Sdf2vecError(f"{one_line(path)}: a second {target}; check them apart")
         exporter = EXPORTERS[target]
         beside = {ending: beside_of(path, exporter.suffix, ending) for ending in exporter.beside}
         try:
@@ -176,7 +172,7 @@ def read_exports(paths: Iterable[str]) -> dict[str, Exported]:
             found[target] = Exported(data if target in BINARY else data.decode(), there)
         except (OSError, ValueError) as error:
             reason = getattr(error, "strerror", None) or "is no text"
-            raise Sdf2vecError(f"{_shown(path)}: cannot read it ({reason})") from None
+            raise Sdf2vecError(f"{one_line(path)}: cannot read it ({reason})") from None
     return found
 
 
@@ -211,10 +207,10 @@ def plan(
 def _claim(path: str, source: str, taken: dict[str, str], read: set[str]) -> None:
     resolved = str(Path(path).resolve())
     if resolved in read:
-        raise Sdf2vecError(f"{_shown(path)}: would overwrite an input; choose another -o")
+        raise Sdf2vecError(f"{one_line(path)}: would overwrite an input; choose another -o")
     if resolved in taken:
-        both = f"both {_shown(taken[resolved])} and {_shown(source)}"
-        raise Sdf2vecError(f"{_shown(path)}: {both} would be written there; convert them apart")
+        both = f"both {one_line(taken[resolved])} and {one_line(source)}"
+        raise Sdf2vecError(f"{one_line(path)}: {both} would be written there; convert them apart")
     taken[resolved] = source
     require_writable(path)
 
@@ -227,7 +223,7 @@ def _refuse_foreign(path: str, exporter: Exporter) -> None:
     foreign += [other for other in beside if is_ours is None and _is_ours(other, exporter.mark) is False]
     if foreign:
         raise Sdf2vecError(
-            f"{_shown(foreign[0])}: is there, and not made by sdf2vec; choose another -o, or replace it with --force"
+            f"{one_line(foreign[0])}: is there, and not made by sdf2vec; choose another -o, or replace it with --force"
         )
 
 

@@ -30,9 +30,19 @@ def quality(scene: Scene, picture: Picture) -> Quality:
 
     FLIP is that of both scaled down to about a million pixels, where they have more.
     """
-    pixels = picture.premultiplied
-    drawn = draw_fast(scene, picture.width, picture.height)[: pixels.shape[2]]
-    target = torch.from_numpy(np.ascontiguousarray(pixels.transpose(2, 0, 1)))
+    drawn, target = _drawn_and_target(scene, picture)
     small = [scaled(planes.permute(1, 2, 0).numpy(), FLIP_RESOLUTION) for planes in (drawn, target)]
     height, width = small[0].shape[1:]
     return Quality(float(psnr(drawn, target)), float(flip(*small)), (width, height))
+
+
+def psnr_of(scene: Scene, picture: Picture) -> float:
+    """PSNR alone, in dB: FLIP takes long."""
+    return float(psnr(*_drawn_and_target(scene, picture)))
+
+
+def _drawn_and_target(scene: Scene, picture: Picture) -> tuple[torch.Tensor, torch.Tensor]:
+    """The render and the picture, premultiplied, [C, H, W]."""
+    pixels = picture.premultiplied
+    drawn = draw_fast(scene, picture.width, picture.height)[: pixels.shape[2]]
+    return drawn, torch.from_numpy(np.ascontiguousarray(pixels.transpose(2, 0, 1)))

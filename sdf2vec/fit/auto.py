@@ -16,20 +16,18 @@ import torch
 from msgspec import structs
 
 from ..image import Picture
-from ..quality import Quality, quality
+from ..quality import psnr_of, quality
 from ..render.tensors import SceneTensors, to_scene
 from ..scene import Scene
 from ..threads import threads_of_its_own
-from .initialization import Layers, straight
+from .initialization import Layers
 from .joining import Search
-from .loop import Callback, Progress, Stopped, fit_picture, scaled
+from .loop import Callback, Progress, Stopped, fit_picture, scaled, view_of
 from .matching_pursuit import Painted, find_discs
 from .offers import common_color
 from .settings import AUTO, Settings, preset_of
 from .simplify import simplified
 from .sparse import FLOOR, Round, Sizes, error_of, finished, grow, needed, pruned
-from .surroundings import View
-from .weights import weights_for
 
 SEARCH, JOINT, LAST = 56, 128, 320  # pixels squared
 FEW = 4  # shapes that are placed by trial, also where their number is given
@@ -89,7 +87,7 @@ def _few(picture: Picture, settings: Settings, callback: Callback) -> Fitted | N
 
 def _nearest(scenes: Sequence[Scene], picture: Picture) -> Scene:
     """The first of those with the highest PSNR."""
-    near = [quality(scene, picture).psnr for scene in scenes]
+    near = [psnr_of(scene, picture) for scene in scenes]
     return scenes[near.index(max(near))]
 
 
@@ -99,7 +97,7 @@ def _told(scene: Scene, picture: Picture, settings: Settings) -> Fitted:
         return Fitted(scene)
     if settings.target_psnr is None:
         return Fitted(scene, _counted(scene))
-    met = _missed(quality(scene, picture), settings) <= 0
+    met = _missed(scene, picture, settings) <= 0
     return Fitted(scene, f"{_counted(scene)}: {_wanted(settings)} is {'' if met else 'not '}reached", met)
 
 
@@ -153,14 +151,14 @@ class Drawing:
         generator = torch.Generator().manual_seed(settings.seed)
         layers = Layers(settings.drawn_kinds, settings.compositing)
         self.search = Search(layers, preset_of(settings).falloff, generator, self._tick, pixel)
-        self.sizes = Sizes(*(self._view(resolution) for resolution in (SEARCH, JOINT, LAST)))
+        self.sizes = Sizes(*(view_of(picture.premultiplied, settings, r) for r in (SEARCH, JOINT, LAST)))
         self.scene = SceneTensors([], ground_of(self.sizes.joint.target), settings.compositing, self.size)
 
     def found(self) -> Scene:
         """The scene, as simple as it may be."""
         try:
             for made in grow(self.scene, self.sizes, self.search, self.settings.most, self.floor):
-                self.scene, self.error = made.scene, made.error
+                self.scene = made.scene
                 if self._is_no_drawing(made):
                     self.gave_up = True
                     break
@@ -185,13 +183,6 @@ class Drawing:
         most = UNLIKELY * self.settings.most if self.flat else SOFT_MOST
         return made.scene.layer_count + needed(made, self.flat, self.floor) > most
 
-    def _view(self, resolution: float) -> View:
-        target = scaled(self.picture.premultiplied, resolution)
-        if self.settings.weights is None:
-            return View(target, None)
-        height, width = target.shape[1:]
-        return View(target, torch.from_numpy(weights_for(self.settings.weights, width, height)))
-
     def _tick(self, loss: float) -> None:
         count = self.scene.layer_count
         if self.callback(Progress("finding shapes", count, max(count + 1, self.settings.most), loss)):
@@ -206,7 +197,7 @@ def ground_of(target: torch.Tensor) -> torch.Tensor:
     common = common_color(colors, torch.ones(len(colors)))
     near = (colors - common).abs().amax(1) < LEVELS
     ground = common if float(near.float().mean()) >= DOMINANT else colors.mean(0)
-    return torch.cat([straight(ground[None])[0, :3], torch.ones(1)])
+    return torch.cat([ground, torch.ones(1)])
 
 
 # --- targets --------------------------------------------------------------------------------------------------
@@ -221,17 +212,21 @@ def _painted(picture: Picture, settings: Settings, callback: Callback) -> Fitted
         return Fitted(
             scene, f"{_counted(scene)}: as many as are allowed, for it is no drawing (--max-shapes)"
         )
-    seen = quality(scene, picture)
-    if _missed(seen, settings) > 0:
+    missed = _missed(scene, picture, settings)
+    if missed > 0:
         return Fitted(scene, f"{_counted(scene)}: {_wanted(settings)} is not reached (--max-shapes)", False)
-    for fewer in _fewer(picture, settings, scene, callback):
+    for fewer in _fewer(picture, settings, scene.shape_count, missed, callback):
         scene = fewer
     return Fitted(scene, f"{_counted(scene)} reach {_wanted(settings)}")
 
 
-def _fewer(picture: Picture, settings: Settings, scene: Scene, callback: Callback) -> Iterator[Scene]:
-    """Scenes of ever fewer shapes that meet the target: what a number misses goes with its logarithm, about."""
-    high, above = scene.shape_count, _missed(quality(scene, picture), settings)
+def _fewer(
+    picture: Picture, settings: Settings, high: int, above: float, callback: Callback
+) -> Iterator[Scene]:
+    """Scenes of ever fewer shapes that meet the target: what a number misses goes with its logarithm, about.
+
+    `above`: what `high` shapes miss it by, which is at most 0.
+    """
     low, below = 0, 0.0
     for _ in range(TRIES):
         part = below / (below - above) if low else 1.0 + above / SLOPE / max(math.log2(high), 1.0)
@@ -240,7 +235,7 @@ def _fewer(picture: Picture, settings: Settings, scene: Scene, callback: Callbac
         if count <= low:
             return
         tried = fit_picture(picture, structs.replace(settings, shapes=count), callback)
-        missed = _missed(quality(tried, picture), settings)
+        missed = _missed(tried, picture, settings)
         if missed <= 0:
             high, above = count, missed
             yield tried
@@ -248,15 +243,14 @@ def _fewer(picture: Picture, settings: Settings, scene: Scene, callback: Callbac
             low, below = count, missed
 
 
-def _missed(seen: Quality, settings: Settings) -> float:
+def _missed(scene: Scene, picture: Picture, settings: Settings) -> float:
     """By how many dB, or about so many, a target is missed; negative where it is more than met."""
-    missed = -math.inf
-    if settings.target_psnr is not None:
-        missed = settings.target_psnr - seen.psnr
-    if settings.target_flip is not None:
-        ratio = seen.flip / max(settings.target_flip, 1e-6)
-        missed = max(missed, 2 * SLOPE * math.log2(max(ratio, 1e-6)))
-    return missed
+    if settings.target_flip is None:
+        return (settings.target_psnr or 0.0) - psnr_of(scene, picture)
+    seen = quality(scene, picture)
+    ratio = seen.flip / max(settings.target_flip, 1e-6)
+    missed = 2 * SLOPE * math.log2(max(ratio, 1e-6))
+    return missed if settings.target_psnr is None else max(missed, settings.target_psnr - seen.psnr)
 
 
 def _wanted(settings: Settings) -> str:

@@ -8,7 +8,6 @@ dense renderer: kernels would have to be compiled for every structure.
 from __future__ import annotations
 
 import math
-import operator
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
@@ -25,7 +24,7 @@ from .candidates import Proposer, Tried, alone, openings, reductions
 from .constraints import project
 from .initialization import Layers, straight
 from .levenberg import Numbers, descend
-from .surroundings import Surroundings, View, points_of, some
+from .surroundings import Surroundings, View, layer_at, points_of, some
 
 RESOLUTIONS = 40, 80  # pixels squared at which candidates are tried; at which the best are refined first
 SCREENING, TRAINING = 4, 10  # steps of every finalist; of the best of them after that
@@ -59,15 +58,14 @@ def join(scene: SceneTensors, views: Sequence[View], search: Search, most: int) 
     while left and most > 0:
         order = max(left, key=_faults(scene, coarse).__getitem__)
         left.remove(order)
-        (layer,) = some(scene, partial(operator.eq, order)).groups
+        layer = layer_at(scene, order)
         found, tries = search.joined(layer, Surroundings.of(scene, order, coarse), most)
         for view in finer:
             around = Surroundings.of(scene, order, view)
             refined = [search.refined(tried.layer, around) for tried in found]
             found = [best] = [min(refined, key=search.worth(around, PRICE).of)]
         if best.error < around.error(layer):
-            changed = inserted(scene, replace(best.layer, order=torch.tensor([order])))
-            scene = _grounded(changed, finer[-1])
+            scene = _grounded(inserted(scene, best.layer), finer[-1])
         most -= tries
         yield detached(scene)
 

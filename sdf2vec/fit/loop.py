@@ -209,14 +209,9 @@ class Fit:
             self.callback(Progress("compiling kernels (once)", 0, self.steps, math.nan))
 
     def _stage(self, phase: Phase) -> Stage:
-        resolution = self._resolution(phase)
-        target = scaled(self.pixels, resolution).to(self.backend.device)
-        weights = None
-        if self.settings.weights is not None:
-            height, width = target.shape[1:]
-            weights = torch.from_numpy(weights_for(self.settings.weights, width, height)).to(
-                self.backend.device
-            )
+        view, device = view_of(self.pixels, self.settings, self._resolution(phase)), self.backend.device
+        target = view.target.to(device)
+        weights = None if view.weights is None else view.weights.to(device)
         return Stage(phase, target, weights, objective(phase.loss, target, weights, self.backend.losses))
 
     def _resolution(self, phase: Phase) -> float:
@@ -384,3 +379,12 @@ def scaled(pixels: np.ndarray, resolution: float) -> torch.Tensor:
     size = max(1, round(width * factor)), max(1, round(height * factor))
     small = premultiply(resize(unpremultiply(pixels), *size)) if channels == 4 else resize(pixels, *size)
     return torch.from_numpy(np.ascontiguousarray(small.transpose(2, 0, 1)))
+
+
+def view_of(pixels: np.ndarray, settings: Settings, resolution: float) -> View:
+    """A picture scaled down, with the weights that the settings give its pixels."""
+    target = scaled(pixels, resolution)
+    if settings.weights is None:
+        return View(target, None)
+    height, width = target.shape[1:]
+    return View(target, torch.from_numpy(weights_for(settings.weights, width, height)))

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 from collections import defaultdict
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -39,64 +39,6 @@ APART, ALIKE = 0.15, 0.4  # overlap below which two shapes are apart; above whic
 EACH, STEPS = 2, 12  # shapes of a kind that are refined in a place; steps of each
 ROUGH, CLEAN = 0.3, 0.06  # what is left of a region, at most, by a shape that may explain it; that does
 PRICE = 0.02  # of a number, in logarithms of what is left
-
-
-@dataclass(frozen=True)
-class Offer:
-    """A layer of one shape for a place in the draw order, and what it does.
-
-    `gain`: by how much the mean squared error falls; `potential`: the most that it could fall in the region it is for;
-    `left`: the share of that which stays, and what becomes worse elsewhere.
-    """
-
-    layer: Group
-    region: Region
-    cover: torch.Tensor  # [P]
-    gain: float
-    potential: float
-    left: float
-
-    @property
-    def kind(self) -> str:
-        """Of its shape."""
-        return self.layer.structure[0].kind
-
-    @property
-    def order(self) -> int:
-        """Its place in the draw order."""
-        return int(self.layer.order)
-
-
-def _best(tries: Sequence[Offer], floor: float) -> Offer:
-    """That which leaves least, where each number has its price."""
-
-    def score(offer: Offer) -> float:
-        left = max(offer.left * offer.potential, 0.1 * floor)
-        return math.log(left) + PRICE * row_width(offer.layer.structure)
-
-    return min(tries, key=score)
-
-
-def offers(
-    places: Sequence[Surroundings], orders: Sequence[int], search: Search, floor: float
-) -> list[Offer]:
-    """Shapes that hardly overlap, each the best for its region; else the one that gains most.
-
-    `places`: the scene as it is seen from each of the `orders`. `floor`: mean squared error that need not be explained.
-    """
-    found = [
-        offer
-        for place, order in zip(places, orders, strict=True)
-        for offer in _searched(place, order, search)
-    ]
-    found.sort(key=lambda offer: (offer.left > ROUGH, -offer.gain))
-    around = dict(zip(orders, places, strict=True))
-    tried = _refined(_tries(found), around, search)
-    best = [_best(tries, floor) for tries in tried if tries]
-    clean = [offer for offer in best if offer.left < CLEAN]
-    return (
-        _apart(sorted(clean, key=lambda offer: offer.left)) or sorted(best, key=lambda offer: -offer.gain)[:1]
-    )
 
 
 @dataclass(frozen=True)
@@ -132,6 +74,55 @@ class Region:
         return self.labels == int(inside.argmax()) if inside.max() > 0 else None
 
 
+@dataclass(frozen=True)
+class Offer:
+    """A layer of one shape for a place in the draw order, and what it does.
+
+    `gain`: by how much the mean squared error falls; `potential`: the most that it could fall in the region it is for;
+    `left`: the share of that which stays, and what becomes worse elsewhere.
+    """
+
+    layer: Group
+    region: Region
+    cover: torch.Tensor  # [P]
+    gain: float
+    potential: float
+    left: float
+
+    @property
+    def kind(self) -> str:
+        """Of its shape."""
+        return self.layer.structure[0].kind
+
+    @property
+    def order(self) -> int:
+        """Its place in the draw order."""
+        return int(self.layer.order)
+
+
+def offers(around: Mapping[int, Surroundings], search: Search, floor: float) -> list[Offer]:
+    """Shapes that hardly overlap, each the best for its region; else the one that gains most.
+
+    `around`: the scene as it is seen from places of the draw order. `floor`: mean squared error that need not be
+    explained.
+    """
+    found = [offer for order, place in around.items() for offer in _searched(place, order, search)]
+    found.sort(key=lambda offer: (offer.left > ROUGH, -offer.gain))
+    best = [_best(tries, floor) for tries in _refined(_tries(found), around, search) if tries]
+    clean = sorted((offer for offer in best if offer.left < CLEAN), key=lambda offer: offer.left)
+    return _apart(clean) or sorted(best, key=lambda offer: -offer.gain)[:1]
+
+
+def _best(tries: Sequence[Offer], floor: float) -> Offer:
+    """That which leaves least, where each number has its price."""
+
+    def score(offer: Offer) -> float:
+        left = max(offer.left * offer.potential, 0.1 * floor)
+        return math.log(left) + PRICE * row_width(offer.layer.structure)
+
+    return min(tries, key=score)
+
+
 def _searched(around: Surroundings, order: int, search: Search) -> Iterator[Offer]:
     """All that shapes come to from many starts, where the error falls."""
     here = torch.tensor([order])
@@ -146,24 +137,29 @@ def _searched(around: Surroundings, order: int, search: Search) -> Iterator[Offe
         ends = proposer.optima(kind, openings, wanted, around, STARTS)
         if ends:
             rows = torch.cat([layer.rows() for _, layer in ends])
-            yield from _offers_of(rows, ends[0][1], [regions[index] for index, _ in ends], around)
+            made = _offers_of(rows, ends[0][1], [regions[index] for index, _ in ends], around)
+            yield from (offer for offer in made if offer is not None)
 
 
 def _offers_of(
     rows: torch.Tensor, like: Group, regions: Sequence[Region], around: Surroundings
-) -> Iterator[Offer]:
-    """What layers with these rows [N, U] gain, of those that do."""
+) -> list[Offer | None]:
+    """What layers with these rows [N, U] gain; None for those that don't."""
     structure = like.structure
     before = around.residual().square().mean(0).flatten()
     after = around.problem(structure).wrong(rows[..., None]).square().mean(1)
     covers, _ = rows_coverage(structure, rows[..., None], around.scene.compositing, *around.points)
+    made: list[Offer | None] = []
     for row, region, cover, rest in zip(rows, regions, covers, after, strict=True):
         gain, inside = float((before - rest).mean()), region.under(cover)
-        if gain > 0 and inside is not None:
-            potential = float((before * inside).mean())
-            left = float((rest * inside).mean() + ((rest - before).clamp_min(0.0) * ~inside).mean())
-            layer = layer_of(structure, like.order, row[None])
-            yield Offer(layer, region, cover, gain, potential, left / max(potential, 1e-12))
+        if gain <= 0 or inside is None:
+            made.append(None)
+            continue
+        potential = float((before * inside).mean())
+        left = float((rest * inside).mean() + ((rest - before).clamp_min(0.0) * ~inside).mean())
+        layer = layer_of(structure, like.order, row[None])
+        made.append(Offer(layer, region, cover, gain, potential, left / max(potential, 1e-12)))
+    return made
 
 
 def _tries(found: Sequence[Offer]) -> list[list[Offer]]:
@@ -186,7 +182,7 @@ def _tries(found: Sequence[Offer]) -> list[list[Offer]]:
 
 
 def _refined(
-    tries: Sequence[Sequence[Offer]], around: dict[int, Surroundings], search: Search
+    tries: Sequence[Sequence[Offer]], around: Mapping[int, Surroundings], search: Search
 ) -> list[list[Offer]]:
     """The same after some steps of all their numbers; all of a kind at once."""
     alike: dict[tuple[int, str], list[tuple[int, Offer]]] = defaultdict(list)
@@ -198,10 +194,11 @@ def _refined(
         first, place = members[0][1].layer, around[order]
         numbers = search.numbers(place, first.structure, lambda slot: True)
         rows = torch.cat([offer.layer.rows() for _, offer in members])
-        problem = _counted(place.problem(first.structure), [offer.region.counts for _, offer in members])
+        regions = [offer.region for _, offer in members]
+        problem = _counted(place.problem(first.structure), [region.counts for region in regions])
         rows, _ = descend(rows, problem, numbers, STEPS, search.tick)
-        for (index, offer), row in zip(members, rows, strict=True):
-            made[index] += _offers_of(row[None], first, [offer.region], place)
+        for (index, _), better in zip(members, _offers_of(rows, first, regions, place), strict=True):
+            made[index] += [better] if better is not None else []
     return made
 
 

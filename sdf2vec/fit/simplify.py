@@ -7,7 +7,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterator
-from dataclasses import replace
 from functools import cache
 
 import torch
@@ -18,10 +17,10 @@ from ..layer import LOOK, Part, Slot, slots
 from ..lower.torch import Tensors, compile_torch
 from ..render.tensors import Group, SceneTensors
 from ..shapes import KINDS
-from ..units import ANGLE, OPACITY
+from ..units import ANGLE
 from .joining import Search, inserted
-from .sparse import error_of, layer_at
-from .surroundings import Surroundings, View
+from .sparse import error_of
+from .surroundings import Surroundings, View, layer_at
 
 STEPS = 10  # of a changed layer
 RISE = 1.02  # of the error, at most, by one change
@@ -52,7 +51,7 @@ def _tried(
     """The scene with a layer whose other numbers have moved a little."""
     around = Surroundings.of(scene, int(layer.order), view)
     tried = search.trained(layer, around, STEPS, lambda slot: slot not in still)
-    return inserted(scene, replace(tried.layer, order=layer.order))
+    return inserted(scene, tried.layer)
 
 
 # --- changes --------------------------------------------------------------------------------------------------
@@ -122,8 +121,8 @@ def _is_extent(slot: Slot) -> bool:
 
 
 def _opaque(layer: Group, view: View) -> Iterator[Change]:
-    slot = Slot(None, LOOK[0])
-    if slot.parameter.unit is OPACITY and float(layer.opacity) >= NEARLY_OPAQUE:
+    if float(layer.opacity) >= NEARLY_OPAQUE:
+        slot = Slot(None, LOOK[0])
         yield _with(layer, slot, 1.0), (slot,)
 
 

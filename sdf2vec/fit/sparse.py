@@ -15,13 +15,13 @@ from functools import partial
 import torch
 
 from ..render import fused
-from ..render.tensors import Group, SceneTensors
+from ..render.tensors import SceneTensors
 from .adam import adam_over
 from .constraints import enforce_min_thickness, project
 from .joining import Search, detached, inserted
 from .offers import Offer, offers
 from .presets import Phase
-from .surroundings import Surroundings, View, some
+from .surroundings import Surroundings, View, layer_at, some
 
 FLOOR = 10**-4.4  # mean squared error, 44 dB: below it nothing is missing
 FEW = 24  # layers that are descended one by one, too
@@ -92,8 +92,9 @@ def _wrong(scene: SceneTensors, view: View) -> torch.Tensor:
 def _offers(scene: SceneTensors, view: View, search: Search, floor: float) -> list[Offer]:
     """New layers, for the top of the scene or its bottom; the draw order is that of the scene without the others."""
     orders = sorted({0, scene.layer_count})
-    places = [Surroundings.of(_opened(scene, order), order, view) for order in orders]
-    return offers(places, orders, search, floor)
+    return offers(
+        {order: Surroundings.of(_opened(scene, order), order, view) for order in orders}, search, floor
+    )
 
 
 def _opened(scene: SceneTensors, order: int) -> SceneTensors:
@@ -156,13 +157,7 @@ def _improved(scene: SceneTensors, order: int, view: View, search: Search) -> Sc
     layer, around = layer_at(scene, order), Surroundings.of(scene, order, view)
     tried = search.trained(layer, around, EACH, lambda slot: True)
     better = tried.error < around.error(layer)
-    return inserted(scene, replace(tried.layer, order=layer.order)) if better else scene
-
-
-def layer_at(scene: SceneTensors, order: int) -> Group:
-    """The layer at a place of the draw order."""
-    (layer,) = some(scene, partial(operator.eq, order)).groups
-    return layer
+    return inserted(scene, tried.layer) if better else scene
 
 
 def descended(scene: SceneTensors, view: View, search: Search, phase: Phase) -> SceneTensors:
@@ -193,12 +188,14 @@ def pruned(scene: SceneTensors, sizes: Sizes, search: Search, worst: float = FLO
         fewer = _fewer(scene, sizes, search, max(NEEDLESS * error, worst))
         if fewer is None:
             return scene
-        scene, error = fewer, error_of(fewer, sizes.joint)
+        scene, error = fewer
     return scene
 
 
-def _fewer(scene: SceneTensors, sizes: Sizes, search: Search, worst: float) -> SceneTensors | None:
-    """The scene without one of the layers that matter least, if its error is at most the worst."""
+def _fewer(
+    scene: SceneTensors, sizes: Sizes, search: Search, worst: float
+) -> tuple[SceneTensors, float] | None:
+    """The scene without one of the layers that matter least, and its error, if that is at most the worst."""
     tried = [without(scene, order) for order in range(scene.layer_count)]
     ranked = sorted((error_of(fewer, sizes.joint), i) for i, fewer in enumerate(tried))[:TRIED]
     for error, index in ranked:
@@ -211,7 +208,7 @@ def _fewer(scene: SceneTensors, sizes: Sizes, search: Search, worst: float) -> S
             fewer = descended(fewer, sizes.joint, search, AFTER)
             error = error_of(fewer, sizes.joint)
         if error <= worst:
-            return fewer
+            return fewer, error
     return None
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import operator
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import partial
@@ -35,6 +36,12 @@ def some(scene: SceneTensors, which: Callable[[torch.Tensor], torch.Tensor]) -> 
     picked = [(group, which(group.order).nonzero()[:, 0]) for group in scene.groups]
     groups = [group.each(partial(_take, rows)) for group, rows in picked if len(rows)]
     return replace(scene, groups=groups)
+
+
+def layer_at(scene: SceneTensors, order: int) -> Group:
+    """The layer at a place of the draw order."""
+    (layer,) = some(scene, partial(operator.eq, order)).groups
+    return layer
 
 
 def _take(rows: torch.Tensor, tensor: torch.Tensor) -> torch.Tensor:
