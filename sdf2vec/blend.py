@@ -99,7 +99,7 @@ JOINS: dict[str, Join] = {
         Join("intersection", "&", smooth_intersection),
     )
 }
-UNION = "union"
+UNION, SUBTRACTION = "union", "subtraction"
 
 
 def union_reach(count: int, smoothness: Expr) -> Expr:

@@ -9,18 +9,20 @@ from __future__ import annotations
 import math
 from collections import Counter
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import torch
 from msgspec import structs
 
 from ..image import Picture
+from ..paints import FLAT as ONE_COLOR
 from ..quality import psnr_of, quality
 from ..render.tensors import SceneTensors, to_scene
 from ..scene import Scene
 from ..threads import threads_of_its_own
-from .initialization import Layers
+from .backends import CPU, choose
+from .initialization import Layers, empty_groups
 from .joining import Search
 from .loop import Callback, Progress, Stopped, fit_picture, scaled, view_of
 from .matching_pursuit import Painted, find_discs
@@ -58,8 +60,9 @@ def fitted_picture(
     """Fits shapes to a picture, as many as the settings say or as it needs. The same settings give the same scene.
 
     The callback runs after every step; when it returns True, the fit ends and what is there is returned. Raises
-    Sdf2vecError where the start scene does not suit the picture or the settings.
+    Sdf2vecError where the start scene does not suit the picture or the settings, and for a device that is not here.
     """
+    choose(settings.device)  # drawings are searched on the CPU, but what is asked for must be there
     with threads_of_its_own():
         return _few(picture, settings, callback) or _painted(picture, settings, callback)
 
@@ -103,6 +106,7 @@ def _told(scene: Scene, picture: Picture, settings: Settings) -> Fitted:
 
 def _may_be_few(settings: Settings) -> bool:
     plain = settings.compositing == "over" and settings.union == 1 and settings.start is None
+    plain = plain and settings.paint == ONE_COLOR and settings.min_area is None
     more = settings.palette or settings.colors or settings.cuts or settings.trials
     few = settings.shapes == AUTO or settings.shapes <= FEW
     return plain and few and not more and bool(settings.drawn_kinds) and settings.target_flip is None
@@ -157,6 +161,7 @@ class Drawing:
     def found(self) -> Scene:
         """The scene, as simple as it may be."""
         try:
+            self._announce_compiling()
             for made in grow(self.scene, self.sizes, self.search, self.settings.most, self.floor):
                 self.scene = made.scene
                 if self._is_no_drawing(made):
@@ -183,9 +188,17 @@ class Drawing:
         most = UNLIKELY * self.settings.most if self.flat else SOFT_MOST
         return made.scene.layer_count + needed(made, self.flat, self.floor) > most
 
+    def _announce_compiling(self) -> None:
+        kinds = replace(self.scene, groups=empty_groups(self.search.layers))
+        if not CPU.is_compiled(kinds, len(self.sizes.joint.target)):
+            self._say("compiling kernels (once)", math.nan)
+
     def _tick(self, loss: float) -> None:
+        self._say("finding shapes", loss)
+
+    def _say(self, phase: str, loss: float) -> None:
         count = self.scene.layer_count
-        if self.callback(Progress("finding shapes", count, max(count + 1, self.settings.most), loss)):
+        if self.callback(Progress(phase, count, max(count + 1, self.settings.most), loss)):
             raise Stopped
 
 

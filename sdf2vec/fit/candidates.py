@@ -50,10 +50,13 @@ class Mask(NamedTuple):
         """By how much the error falls where all is covered, [P]."""
         return self.strength * (2.0 * self.amount - self.strength)
 
+    def only(self, share: torch.Tensor) -> Mask:
+        """Such that an error at a point matters so much, [P]."""
+        return Mask(self.strength * share, self.amount * share, self.rest)
+
     def eager(self) -> Mask:
         """Such that too much matters less."""
-        share = torch.where(self.gain > 0, 1.0, EAGER)
-        return Mask(self.strength * share, self.amount * share, self.rest)
+        return self.only(torch.where(self.gain > 0, 1.0, EAGER))
 
 
 @dataclass(frozen=True)

@@ -15,11 +15,12 @@ from typing import Any
 import torch
 from torch.nn.functional import max_pool2d
 
+from ..blend import SUBTRACTION
 from ..deferred import deferred
 from ..layer import row_width
 from ..render.reference import rows_coverage
 from ..render.tensors import Group
-from .candidates import Mask, Opening, alone
+from .candidates import Opening, alone, openings
 from .initialization import straight
 from .joining import Search, layer_of
 from .levenberg import Problem, descend
@@ -39,6 +40,8 @@ APART, ALIKE = 0.15, 0.4  # overlap below which two shapes are apart; above whic
 EACH, STEPS = 2, 12  # shapes of a kind that are refined in a place; steps of each
 ROUGH, CLEAN = 0.3, 0.06  # what is left of a region, at most, by a shape that may explain it; that does
 PRICE = 0.02  # of a number, in logarithms of what is left
+CUT, CUT_KINDS = 4, 2  # shapes from which others are cut; kinds of these
+WORTH, HOPELESS = 0.05, 1.5  # least share of all that is missing, most that is left, where shapes are cut
 
 
 @dataclass(frozen=True)
@@ -64,26 +67,27 @@ class Region:
         inside = (wanted > REGION * wanted.max()).reshape(around.shape).numpy()
         beside = max_pool2d(near.reshape(1, 1, *around.shape).float(), 3, 1, 1).flatten() > 0
         counts = (beside | (gain == 0.0)).float()
-        mask = Mask(opening.mask.strength * counts, opening.mask.amount * counts, opening.mask.rest)
-        return cls(replace(opening, mask=mask), wanted, torch.from_numpy(label(inside)).flatten(), counts)
+        opening = replace(opening, mask=opening.mask.only(counts))
+        return cls(opening, wanted, torch.from_numpy(label(inside)).flatten(), counts)
 
-    def under(self, cover: torch.Tensor) -> torch.Tensor | None:
-        """The part [P] that a shape covers most of, if any."""
+    def under(self, cover: torch.Tensor) -> int:
+        """The number of the part that a shape [P] covers most of; 0 where it covers none."""
         inside = torch.bincount(self.labels, weights=cover)
         inside[0] = 0.0
-        return self.labels == int(inside.argmax()) if inside.max() > 0 else None
+        return int(inside.argmax()) if inside.max() > 0 else 0
 
 
 @dataclass(frozen=True)
 class Offer:
     """A layer of one shape for a place in the draw order, and what it does.
 
-    `gain`: by how much the mean squared error falls; `potential`: the most that it could fall in the region it is for;
-    `left`: the share of that which stays, and what becomes worse elsewhere.
+    `gain`: by how much the mean squared error falls; `potential`: the most that it could fall in the part of the region
+    that it is for; `left`: the share of that which stays, and what becomes worse elsewhere.
     """
 
     layer: Group
     region: Region
+    part: int  # of the region
     cover: torch.Tensor  # [P]
     gain: float
     potential: float
@@ -106,9 +110,15 @@ def offers(around: Mapping[int, Surroundings], search: Search, floor: float) -> 
     `around`: the scene as it is seen from places of the draw order. `floor`: mean squared error that need not be
     explained.
     """
-    found = [offer for order, place in around.items() for offer in _searched(place, order, search)]
-    found.sort(key=lambda offer: (offer.left > ROUGH, -offer.gain))
+    every = [offer for order, place in around.items() for offer in _searched(place, order, search)]
+    found = sorted(
+        (offer for offer in every if offer.gain > 0), key=lambda offer: (offer.left > ROUGH, -offer.gain)
+    )
     best = [_best(tries, floor) for tries in _refined(_tries(found), around, search) if tries]
+    cut = [
+        _best(tries, floor) for base in _unfit(every, best, around) if (tries := _cut(base, around, search))
+    ]
+    best = [offer for offer in (*best, *cut) if offer.gain > 0]
     clean = sorted((offer for offer in best if offer.left < CLEAN), key=lambda offer: offer.left)
     return _apart(clean) or sorted(best, key=lambda offer: -offer.gain)[:1]
 
@@ -144,21 +154,22 @@ def _searched(around: Surroundings, order: int, search: Search) -> Iterator[Offe
 def _offers_of(
     rows: torch.Tensor, like: Group, regions: Sequence[Region], around: Surroundings
 ) -> list[Offer | None]:
-    """What layers with these rows [N, U] gain; None for those that don't."""
+    """What layers with these rows [N, U] gain; None for those that cover nothing of their region."""
     structure = like.structure
     before = around.residual().square().mean(0).flatten()
     after = around.problem(structure).wrong(rows[..., None]).square().mean(1)
     covers, _ = rows_coverage(structure, rows[..., None], around.scene.compositing, *around.points)
     made: list[Offer | None] = []
     for row, region, cover, rest in zip(rows, regions, covers, after, strict=True):
-        gain, inside = float((before - rest).mean()), region.under(cover)
-        if gain <= 0 or inside is None:
+        part = region.under(cover)
+        if not part:
             made.append(None)
             continue
+        gain, inside = float((before - rest).mean()), region.labels == part
         potential = float((before * inside).mean())
         left = float((rest * inside).mean() + ((rest - before).clamp_min(0.0) * ~inside).mean())
         layer = layer_of(structure, like.order, row[None])
-        made.append(Offer(layer, region, cover, gain, potential, left / max(potential, 1e-12)))
+        made.append(Offer(layer, region, part, cover, gain, potential, left / max(potential, 1e-12)))
     return made
 
 
@@ -191,15 +202,46 @@ def _refined(
             alike[offer.order, offer.kind].append((index, offer))
     made: list[list[Offer]] = [[] for _ in tries]
     for (order, _), members in alike.items():
-        first, place = members[0][1].layer, around[order]
-        numbers = search.numbers(place, first.structure, lambda slot: True)
-        rows = torch.cat([offer.layer.rows() for _, offer in members])
-        regions = [offer.region for _, offer in members]
-        problem = _counted(place.problem(first.structure), [region.counts for region in regions])
-        rows, _ = descend(rows, problem, numbers, STEPS, search.tick)
-        for (index, _), better in zip(members, _offers_of(rows, first, regions, place), strict=True):
+        layers, regions = [offer.layer for _, offer in members], [offer.region for _, offer in members]
+        descended = _descended(layers, regions, around[order], search)
+        for (index, _), better in zip(members, descended, strict=True):
             made[index] += [better] if better is not None else []
     return made
+
+
+def _unfit(every: Sequence[Offer], best: Sequence[Offer], around: Mapping[int, Surroundings]) -> list[Offer]:
+    """For parts of regions that no shape is clean for, and where much is missing, the one that leaves least."""
+    missing = max(float(place.residual().square().mean()) for place in around.values())
+    clean = [offer.cover for offer in best if offer.left < CLEAN]
+    bases: dict[tuple[int, int, int], Offer] = {}
+    for offer in sorted(every, key=lambda offer: offer.left):
+        done = offer.left < CLEAN or any(_likeness(offer.cover, cover) > ALIKE for cover in clean)
+        if offer.potential >= WORTH * missing and offer.left < HOPELESS and not done:
+            bases.setdefault((offer.order, id(offer.region), offer.part), offer)
+    return sorted(bases.values(), key=lambda offer: -offer.potential)[:CUT]
+
+
+def _cut(base: Offer, around: Mapping[int, Surroundings], search: Search) -> list[Offer]:
+    """A layer with a shape cut out of it, of the likeliest kinds."""
+    place, region = around[base.order], base.region
+    mask = next(opening for opening in openings(base.layer, place) if opening.join == SUBTRACTION)
+    opening = replace(mask, mask=mask.mask.only(region.counts))
+    (found,) = search.proposer(place).candidates([opening], place)
+    likely = sorted(found, key=lambda tried: tried.error)[:CUT_KINDS]
+    made = [_descended([tried.layer], [region], place, search)[0] for tried in likely]
+    return [offer for offer in made if offer is not None]
+
+
+def _descended(
+    layers: Sequence[Group], regions: Sequence[Region], around: Surroundings, search: Search
+) -> list[Offer | None]:
+    """Layers of one structure, each for its region, after some steps of all their numbers; None for what is no gain."""
+    structure = layers[0].structure
+    numbers = search.numbers(around, structure, lambda slot: True)
+    problem = _counted(around.problem(structure), [region.counts for region in regions])
+    rows = torch.cat([layer.rows() for layer in layers])
+    rows, _ = descend(rows, problem, numbers, STEPS, search.tick)
+    return _offers_of(rows, layers[0], regions, around)
 
 
 def _counted(problem: Problem, counts: Sequence[torch.Tensor]) -> Problem:

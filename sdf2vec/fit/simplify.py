@@ -15,9 +15,11 @@ from ..expr import const
 from ..graph import scalarize
 from ..layer import LOOK, Part, Slot, slots
 from ..lower.torch import Tensors, compile_torch
+from ..paints import BASE, FLAT, PAINTS
 from ..render.tensors import Group, SceneTensors
 from ..shapes import KINDS
-from ..units import ANGLE
+from ..units import ANGLE, COLOR
+from .candidates import reductions
 from .joining import Search, inserted
 from .sparse import error_of
 from .surroundings import Surroundings, View, layer_at
@@ -29,6 +31,7 @@ NEARLY_OPAQUE = 0.3  # on one colour, opacity and colour may stand for each othe
 SOFTEST = 4.0  # pixels of falloff, at most, of what is tried sharp
 
 Change = tuple[Group, tuple[Slot, ...]]  # a layer, and what of it must stay
+Propose = Callable[[Group, View], Iterator[Change]]
 
 
 def simplified(scene: SceneTensors, view: View, search: Search, worst: float) -> SceneTensors:
@@ -37,12 +40,29 @@ def simplified(scene: SceneTensors, view: View, search: Search, worst: float) ->
     for order in range(scene.layer_count):
         kept: tuple[Slot, ...] = ()
         for change in CHANGES:
-            for layer, still in change(layer_at(scene, order), view):
-                tried = _tried(scene, layer, (*kept, *still), view, search)
-                if error_of(tried, view) <= limit:
-                    scene, kept = tried, (*kept, *still)
-                    break
+            while (made := _changed(scene, order, change, kept, view, search, limit)) is not None:
+                scene, still = made
+                kept = (*kept, *still)
     return scene
+
+
+def _changed(
+    scene: SceneTensors,
+    order: int,
+    change: Propose,
+    kept: tuple[Slot, ...],
+    view: View,
+    search: Search,
+    limit: float,
+) -> tuple[SceneTensors, tuple[Slot, ...]] | None:
+    """The scene after the first change of a layer that is no worse than the limit, and what must stay since then."""
+    for layer, still in change(layer_at(scene, order), view):
+        is_new = not still or not set(still).issubset(kept)
+        if is_new and set(search.layers.kinds).issuperset(part.kind for part in layer.structure):
+            tried = _tried(scene, layer, (*kept, *still), view, search)
+            if error_of(tried, view) <= limit:
+                return tried, still
+    return None
 
 
 def _tried(
@@ -57,19 +77,25 @@ def _tried(
 # --- changes --------------------------------------------------------------------------------------------------
 
 
+def _fewer_parts(layer: Group, view: View) -> Iterator[Change]:
+    """The layer without one of its shapes."""
+    yield from ((fewer, ()) for fewer in reductions(layer))
+
+
 def _circle(layer: Group, view: View) -> Iterator[Change]:
-    """One shape as a circle of about its extent: what is mostly hidden may be any kind, and this has fewest numbers."""
-    if len(layer.structure) > 1 or layer.structure[0].kind == "circle":
-        return
-    kind = KINDS[layer.structure[0].kind]
-    if kind.patch is None:
-        center, radius = middle_of(layer)
-        yield _of_kind("circle", layer, {"center": center, "radius": radius}), ()
+    """A shape as a circle of about its extent: what is mostly hidden may be any kind, and this has fewest numbers."""
+    for index, part in enumerate(layer.structure):
+        if part.kind != "circle" and KINDS[part.kind].patch is None:
+            center, radius = middle_of(layer, index)
+            yield (
+                _with_part(layer, index, part._replace(kind="circle"), {"center": center, "radius": radius}),
+                (),
+            )
 
 
-def middle_of(layer: Group) -> tuple[torch.Tensor, torch.Tensor]:
-    """Where the only shape of a layer is [1, 2], and half the mean of its sides [1, 1]."""
-    low_x, low_y, high_x, high_y = _extent(layer.structure[0].kind)(*layer.shape(0))
+def middle_of(layer: Group, index: int) -> tuple[torch.Tensor, torch.Tensor]:
+    """Where a shape of a layer is [1, 2], and half the mean of its sides [1, 1]."""
+    low_x, low_y, high_x, high_y = _extent(layer.structure[index].kind)(*layer.shape(index))
     center = torch.stack([low_x + high_x, low_y + high_y], dim=1) / 2
     return center, (high_x - low_x + high_y - low_y)[:, None] / 4
 
@@ -82,17 +108,23 @@ def _extent(kind: str) -> Callable[..., Tensors]:
     )
 
 
-def _of_kind(kind: str, layer: Group, own: dict[str, torch.Tensor]) -> Group:
-    """The layer of one shape as another kind, with these numbers; the rest is what it was."""
-    structure = (Part(kind, layer.structure[0].paint),)
-    names = {(slot.part, slot.parameter.name): values for slot, values in layer.values.items()}
-    values = {
-        slot: own.get(slot.parameter.name, names.get((slot.part, slot.parameter.name)))
-        for slot in slots(structure)
+def _flat(layer: Group, view: View) -> Iterator[Change]:
+    """A gradient as its mean colour."""
+    for index, part in enumerate(layer.structure):
+        if part.adds and not PAINTS[part.paint].is_flat:
+            ends = [tensor for slot, tensor in layer.values.items() if slot.part == index and _is_color(slot)]
+            mean = torch.stack(ends).mean(0)
+            yield _with_part(layer, index, part._replace(paint=FLAT), {BASE.name: mean}), ()
+
+
+def _with_part(layer: Group, index: int, part: Part, own: dict[str, torch.Tensor]) -> Group:
+    """The layer with another part in the place of one, of which these numbers are known; the rest is what it was."""
+    structure = (*layer.structure[:index], part, *layer.structure[index + 1 :])
+    new = {
+        Slot(index, parameter): own[parameter.name] for parameter in part.parameters if parameter.name in own
     }
-    return Group(
-        structure, layer.order, {slot: tensor for slot, tensor in values.items() if tensor is not None}
-    )
+    values = {slot: new[slot] if slot in new else layer.values[slot] for slot in slots(structure)}
+    return Group(structure, layer.order, values)
 
 
 def _upright(layer: Group, view: View) -> Iterator[Change]:
@@ -126,10 +158,14 @@ def _opaque(layer: Group, view: View) -> Iterator[Change]:
         yield _with(layer, slot, 1.0), (slot,)
 
 
+def _is_color(slot: Slot) -> bool:
+    return slot.parameter.unit is COLOR
+
+
 def _sharp(layer: Group, view: View) -> Iterator[Change]:
     slot = Slot(None, LOOK[1])
     pixel = 1.0 / min(view.target.shape[1:])
-    if KINDS[layer.structure[0].kind].patch is None and float(layer.falloff) <= SOFTEST * pixel:
+    if float(layer.falloff) <= SOFTEST * pixel:
         yield _with(layer, slot, 0.0), (slot,)
 
 
@@ -148,8 +184,10 @@ def _with(layer: Group, changed: Slot, value: float) -> Group:
     return Group(layer.structure, layer.order, values)
 
 
-CHANGES: tuple[Callable[[Group, View], Iterator[Change]], ...] = (
+CHANGES: tuple[Propose, ...] = (
+    _fewer_parts,
     _circle,
+    _flat,
     _unrounded,
     _upright,
     _opaque,
