@@ -50,6 +50,12 @@ class Mask(NamedTuple):
         """By how much the error falls where all is covered, [P]."""
         return self.strength * (2.0 * self.amount - self.strength)
 
+    @property
+    def best_gain(self) -> torch.Tensor:
+        """The same where as much is covered as is best, [P]."""
+        covered = self.amount.clamp_min(0.0).minimum(self.strength)
+        return covered * (2.0 * self.amount - covered)
+
     def only(self, share: torch.Tensor) -> Mask:
         """Such that an error at a point matters so much, [P]."""
         return Mask(self.strength * share, self.amount * share, self.rest)

@@ -20,6 +20,7 @@ from ..deferred import deferred
 from ..layer import row_width
 from ..render.reference import rows_coverage
 from ..render.tensors import Group
+from ..scene import Color
 from .candidates import Opening, alone, openings
 from .initialization import straight
 from .joining import Search, layer_of
@@ -32,7 +33,8 @@ COLORS = 3  # that are missing most, looked for at once
 BINS = 8  # of a channel, when colours are counted
 NEAR = 0.02  # squared distance of colours that are one
 LEAST = 0.02  # share of all that is missing, of a colour that is looked for
-REGION = 0.2  # of the greatest gain: what belongs to a region
+REGION = 0.1  # of the greatest gain: what belongs to a region
+EDGE = 0.3  # least part of a pixel that is wanted, at a region's edge
 STARTS = 6  # of a kind in an opening
 MOST = 12  # shapes that are refined at once
 WEAKEST = 0.05  # of the greatest gain
@@ -41,7 +43,13 @@ EACH, STEPS = 2, 12  # shapes of a kind that are refined in a place; steps of ea
 ROUGH, CLEAN = 0.3, 0.06  # what is left of a region, at most, by a shape that may explain it; that does
 PRICE = 0.02  # of a number, in logarithms of what is left
 CUT, CUT_KINDS = 4, 2  # shapes from which others are cut; kinds of these
+LEAST_GAIN = 0.02  # of what is missing, by a shape that is worth its numbers
+CUTTABLE = 0.3  # how much harm matters where it may be cut away
+WEAK = 0.2  # of the greatest gain: what is clean and gains less waits
+BLAME = 2.0  # for what is left, where clean shapes are rivals
 WORTH, HOPELESS = 0.05, 1.5  # least share of all that is missing, most that is left, where shapes are cut
+
+Place = tuple[int, Color, int]
 
 
 @dataclass(frozen=True)
@@ -59,14 +67,17 @@ class Region:
     @classmethod
     def of(cls, opening: Opening, around: Surroundings) -> Region:
         """Where the picture has about the opening's colour; where it nowhere has, wherever the colour helps."""
-        gain = opening.mask.gain.clamp_min(0.0)
+        height, width = around.shape
         colors = straight(around.target.flatten(1).T)[:, :3]
         near = (colors - opening.color).square().sum(1) < NEAR
-        near = near if bool((gain * near).any()) else torch.ones_like(near)
-        wanted = gain * near
-        inside = (wanted > REGION * wanted.max()).reshape(around.shape).numpy()
-        beside = max_pool2d(near.reshape(1, 1, *around.shape).float(), 3, 1, 1).flatten() > 0
-        counts = (beside | (gain == 0.0)).float()
+        near = near if bool((opening.mask.gain.clamp_min(0.0) * near).any()) else torch.ones_like(near)
+        beside = max_pool2d(near.reshape(1, 1, height, width).float(), 3, 1, 1).flatten() > 0
+        edge = beside & (
+            opening.mask.amount > EDGE * opening.mask.strength
+        )  # of what is thin there is nothing else
+        wanted = opening.mask.best_gain * (near | edge)
+        inside = (wanted > REGION * wanted.max()).reshape(height, width).numpy()
+        counts = (beside | (opening.mask.gain <= 0.0)).float()
         opening = replace(opening, mask=opening.mask.only(counts))
         return cls(opening, wanted, torch.from_numpy(label(inside)).flatten(), counts)
 
@@ -82,7 +93,7 @@ class Offer:
     """A layer of one shape for a place in the draw order, and what it does.
 
     `gain`: by how much the mean squared error falls; `potential`: the most that it could fall in the part of the region
-    that it is for; `left`: the share of that which stays, and what becomes worse elsewhere.
+    that it is for; `stays`: the share of that which does not; `harm`: what becomes worse elsewhere, in the same shares.
     """
 
     layer: Group
@@ -91,7 +102,19 @@ class Offer:
     cover: torch.Tensor  # [P]
     gain: float
     potential: float
-    left: float
+    stays: float
+    harm: float
+
+    @property
+    def left(self) -> float:
+        """All that is wrong with it."""
+        return self.stays + self.harm
+
+    @property
+    def place(self) -> Place:
+        """Its place in the draw order, its colour, and the part of its region."""
+        red, green, blue = self.region.opening.color[0].tolist()
+        return self.order, (red, green, blue), self.part
 
     @property
     def kind(self) -> str:
@@ -118,9 +141,17 @@ def offers(around: Mapping[int, Surroundings], search: Search, floor: float) -> 
     cut = [
         _best(tries, floor) for base in _unfit(every, best, around) if (tries := _cut(base, around, search))
     ]
-    best = [offer for offer in (*best, *cut) if offer.gain > 0]
-    clean = sorted((offer for offer in best if offer.left < CLEAN), key=lambda offer: offer.left)
-    return _apart(clean) or sorted(best, key=lambda offer: -offer.gain)[:1]
+    least = LEAST_GAIN * _missing(around)
+    best = [offer for offer in (*best, *cut) if offer.gain > least]
+    best.sort(key=lambda offer: offer.gain * (BLAME * offer.left - 1.0))
+    most = max((offer.gain for offer in best), default=0.0)
+    clean = [offer for offer in best if offer.left < CLEAN and offer.gain > WEAK * most]
+    return _apart(clean) or best[:1]
+
+
+def _missing(around: Mapping[int, Surroundings]) -> float:
+    """The mean squared error of the scene."""
+    return max(float(place.residual().square().mean()) for place in around.values())
 
 
 def _best(tries: Sequence[Offer], floor: float) -> Offer:
@@ -167,9 +198,10 @@ def _offers_of(
             continue
         gain, inside = float((before - rest).mean()), region.labels == part
         potential = float((before * inside).mean())
-        left = float((rest * inside).mean() + ((rest - before).clamp_min(0.0) * ~inside).mean())
+        stays, harm = float((rest * inside).mean()), float(((rest - before).clamp_min(0.0) * ~inside).mean())
         layer = layer_of(structure, like.order, row[None])
-        made.append(Offer(layer, region, part, cover, gain, potential, left / max(potential, 1e-12)))
+        shares = (share / max(potential, 1e-12) for share in (stays, harm))
+        made.append(Offer(layer, region, part, cover, gain, potential, *shares))
     return made
 
 
@@ -210,14 +242,13 @@ def _refined(
 
 
 def _unfit(every: Sequence[Offer], best: Sequence[Offer], around: Mapping[int, Surroundings]) -> list[Offer]:
-    """For parts of regions that no shape is clean for, and where much is missing, the one that leaves least."""
-    missing = max(float(place.residual().square().mean()) for place in around.values())
-    clean = [offer.cover for offer in best if offer.left < CLEAN]
-    bases: dict[tuple[int, int, int], Offer] = {}
-    for offer in sorted(every, key=lambda offer: offer.left):
-        done = offer.left < CLEAN or any(_likeness(offer.cover, cover) > ALIKE for cover in clean)
-        if offer.potential >= WORTH * missing and offer.left < HOPELESS and not done:
-            bases.setdefault((offer.order, id(offer.region), offer.part), offer)
+    """Where much is missing and nothing is clean, what to cut from: for each part of a region what covers most."""
+    least = WORTH * _missing(around)
+    done = {offer.place for offer in best if offer.left < CLEAN}
+    bases: dict[Place, Offer] = {}
+    for offer in sorted(every, key=lambda offer: offer.stays + CUTTABLE * offer.harm):
+        if offer.potential >= least and CLEAN < offer.left < HOPELESS and offer.place not in done:
+            bases.setdefault(offer.place, offer)
     return sorted(bases.values(), key=lambda offer: -offer.potential)[:CUT]
 
 
