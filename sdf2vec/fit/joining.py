@@ -56,7 +56,7 @@ def join(scene: SceneTensors, views: Sequence[View], search: Search, most: int) 
     coarse, *finer = views
     scene, left = _grounded(detached(scene), finer[-1]), list(range(scene.layer_count))
     while left and most > 0:
-        order = max(left, key=_faults(scene, coarse).__getitem__)
+        order = max(left, key=faults_of(scene, coarse).__getitem__)
         left.remove(order)
         layer = layer_at(scene, order)
         found, tries = search.joined(layer, Surroundings.of(scene, order, coarse), most)
@@ -76,7 +76,7 @@ def detached(scene: SceneTensors) -> SceneTensors:
     return replace(scene, groups=groups, background=scene.background.detach().clone())
 
 
-def _faults(scene: SceneTensors, view: View) -> list[float]:
+def faults_of(scene: SceneTensors, view: View) -> list[float]:
     """For each layer in draw order, how wrong the picture is where it covers."""
     covers, _ = layers_at(scene, *points_of(scene, view))
     faults: list[float] = (covers @ _wrong(scene, view)).tolist()

@@ -127,26 +127,47 @@ class Offer:
         return int(self.layer.order)
 
 
-def offers(around: Mapping[int, Surroundings], search: Search, floor: float) -> list[Offer]:
-    """Shapes that hardly overlap, each the best for its region; else the one that gains most.
+def offers(
+    around: Mapping[int, Surroundings], search: Search, floor: float, greedy: bool = False
+) -> list[Offer]:
+    """Shapes that hardly overlap, each the best for its region; else, or where `greedy`, the one that gains most.
 
     `around`: the scene as it is seen from places of the draw order. `floor`: mean squared error that need not be
     explained.
     """
-    every = [offer for order, place in around.items() for offer in _searched(place, order, search)]
-    found = sorted(
-        (offer for offer in every if offer.gain > 0), key=lambda offer: (offer.left > ROUGH, -offer.gain)
-    )
-    best = [_best(tries, floor) for tries in _refined(_tries(found), around, search) if tries]
-    cut = [
-        _best(tries, floor) for base in _unfit(every, best, around) if (tries := _cut(base, around, search))
-    ]
+    colors = {order: missing_colors(place) for order, place in around.items()}
     least = LEAST_GAIN * _missing(around)
-    best = [offer for offer in (*best, *cut) if offer.gain > least]
+    best = [offer for offer in _found(around, colors, search, floor) if offer.gain > least]
     best.sort(key=lambda offer: offer.gain * (BLAME * offer.left - 1.0))
     most = max((offer.gain for offer in best), default=0.0)
     clean = [offer for offer in best if offer.left < CLEAN and offer.gain > WEAK * most]
-    return _apart(clean) or best[:1]
+    return _apart(clean) if clean and not greedy else best[:1]
+
+
+def instead_of(
+    order: int, color: torch.Tensor, around: Surroundings, search: Search, floor: float
+) -> Group | None:
+    """The layer of about a colour [1, 3] that gains most at a place of the draw order."""
+    found = _found({order: around}, {order: [color]}, search, floor)
+    return max(found, key=lambda offer: offer.gain).layer if found else None
+
+
+def _found(
+    around: Mapping[int, Surroundings],
+    colors: Mapping[int, Sequence[torch.Tensor]],
+    search: Search,
+    floor: float,
+) -> list[Offer]:
+    """For each region of some colours the best shape, and one with another cut out where that leaves something."""
+    every = [
+        offer for order, place in around.items() for offer in _searched(place, order, colors[order], search)
+    ]
+    gaining = sorted(
+        (offer for offer in every if offer.gain > 0), key=lambda offer: (offer.left > ROUGH, -offer.gain)
+    )
+    best = [_best(tries, floor) for tries in _refined(_tries(gaining), around, search) if tries]
+    cut = (_cut(base, around, search) for base in _unfit(every, best, around))
+    return [*best, *(_best(tries, floor) for tries in cut if tries)]
 
 
 def _missing(around: Mapping[int, Surroundings]) -> float:
@@ -164,12 +185,14 @@ def _best(tries: Sequence[Offer], floor: float) -> Offer:
     return min(tries, key=score)
 
 
-def _searched(around: Surroundings, order: int, search: Search) -> Iterator[Offer]:
-    """All that shapes come to from many starts, where the error falls."""
+def _searched(
+    around: Surroundings, order: int, colors: Sequence[torch.Tensor], search: Search
+) -> Iterator[Offer]:
+    """All that shapes in some colours come to from many starts."""
     here = torch.tensor([order])
     regions = [
         Region.of(opening, around)
-        for color in missing_colors(around)
+        for color in colors
         for opening in alone(here, color, search.falloff[0], around)
     ]
     openings, wanted = [region.opening for region in regions], [region.wanted for region in regions]

@@ -14,12 +14,13 @@ from functools import partial
 
 import torch
 
+from ..paints import BASE
 from ..render import fused
 from ..render.tensors import SceneTensors
 from .adam import adam_over
 from .constraints import enforce_min_thickness, project
-from .joining import Search, detached, inserted
-from .offers import Offer, offers
+from .joining import Search, detached, faults_of, inserted
+from .offers import NEAR, Offer, instead_of, offers
 from .presets import Phase
 from .surroundings import Surroundings, View, layer_at, some
 
@@ -30,8 +31,9 @@ JOINT = Phase("joint", 60, 0, rate=0.3, end_rate=0.02)
 AFTER = Phase("after", 40, 0, rate=0.2, end_rate=0.02)  # one layer was taken out
 LAST = Phase("last", 150, 0, rate=0.3, end_rate=0.01)
 MOVED = 0.98  # of the error, at most, after a layer was moved in the draw order
-HELPS = 0.85  # of the error before, at most, of a round that is kept
+HELPS = 0.92  # of the error before, at most, of a round that is kept
 NEEDLESS, HOPEFUL = 1.05, 6.0  # how much the error may rise by a layer taken out: after a descent; before it
+RETHOUGHT = 2  # colours whose layers are found anew in a round, at most
 TRIED = 2  # layers that matter least, of which one may be taken out
 
 
@@ -59,13 +61,16 @@ def grow(
     """The scene after each round, until it has as many layers as `most`, is near enough, or is helped no more."""
     error = error_of(scene, sizes.joint)
     while scene.layer_count < most and error > floor:
-        found = _offers(scene, sizes.search, search, floor)[: most - scene.layer_count]
-        if not found:
-            return
-        made = _descended(_with(scene, found), sizes, search)
-        made = pruned(made, sizes, search, floor)
-        now = error_of(made, sizes.joint)
-        if now > HELPS * error and made.layer_count >= scene.layer_count:
+        for greedy in (False, True):
+            found = _offers(scene, sizes.search, search, floor, greedy)[: most - scene.layer_count]
+            if not found:
+                return
+            made = _descended(_with(scene, found), sizes, search)
+            made = _rethought(pruned(made, sizes, search, floor), sizes, search, floor)
+            now = error_of(made, sizes.joint)
+            if now <= HELPS * error or made.layer_count < scene.layer_count:
+                break
+        else:
             return
         yield Round(made, now, error)
         scene, error = made, now
@@ -89,12 +94,11 @@ def _wrong(scene: SceneTensors, view: View) -> torch.Tensor:
     return (wrong if view.weights is None else wrong * view.weights).square().mean()
 
 
-def _offers(scene: SceneTensors, view: View, search: Search, floor: float) -> list[Offer]:
+def _offers(scene: SceneTensors, view: View, search: Search, floor: float, greedy: bool) -> list[Offer]:
     """New layers, for the top of the scene or its bottom; the draw order is that of the scene without the others."""
     orders = sorted({0, scene.layer_count})
-    return offers(
-        {order: Surroundings.of(_opened(scene, order), order, view) for order in orders}, search, floor
-    )
+    around = {order: Surroundings.of(_opened(scene, order), order, view) for order in orders}
+    return offers(around, search, floor, greedy)
 
 
 def _opened(scene: SceneTensors, order: int) -> SceneTensors:
@@ -158,6 +162,42 @@ def _improved(scene: SceneTensors, order: int, view: View, search: Search) -> Sc
     tried = search.trained(layer, around, EACH, lambda slot: True)
     better = tried.error < around.error(layer)
     return inserted(scene, tried.layer) if better else scene
+
+
+def _rethought(scene: SceneTensors, sizes: Sizes, search: Search, floor: float) -> SceneTensors:
+    """The scene with one shape in the place of some of a colour, found now that others are there, if that is better."""
+    error = error_of(scene, sizes.joint)
+    if not 1 < scene.layer_count <= FEW or error <= floor:
+        return scene
+    for orders in _alike(scene, sizes.search)[:RETHOUGHT]:
+        rest = scene
+        for order in reversed(orders):
+            rest = without(rest, order)
+        opened = _opened(rest, orders[0])
+        color = layer_at(scene, orders[0]).of(BASE.name, 0)
+        around = Surroundings.of(opened, orders[0], sizes.search)
+        other = instead_of(orders[0], color, around, search, floor)
+        if other is None:
+            continue
+        made = descended(inserted(opened, other), sizes.joint, search, AFTER)
+        now = error_of(made, sizes.joint)
+        if now < (HELPS if len(orders) == 1 else NEEDLESS) * error:
+            return pruned(made, sizes, search, floor)
+    return scene
+
+
+def _alike(scene: SceneTensors, view: View) -> list[list[int]]:
+    """Places in the draw order of layers of about one colour, those first where most is wrong."""
+    faults = faults_of(scene, view)
+    found: list[tuple[torch.Tensor, list[int]]] = []
+    for order in range(scene.layer_count):
+        color = layer_at(scene, order).of(BASE.name, 0)
+        same = [orders for other, orders in found if (color - other).square().sum() < NEAR]
+        if same:
+            same[0].append(order)
+        else:
+            found.append((color, [order]))
+    return sorted((orders for _, orders in found), key=lambda orders: -sum(faults[order] for order in orders))
 
 
 def descended(scene: SceneTensors, view: View, search: Search, phase: Phase) -> SceneTensors:
