@@ -14,8 +14,8 @@ from typing import TYPE_CHECKING, Literal, NoReturn
 from msgspec.structs import replace
 
 from . import __version__, cached, guard
-from .batch import Batch, about, about_left, exit_status, run_batch, sources_of
-from .converting import Work, standard_input, write_exports
+from .batch import Batch, about, about_left, exit_status, run_batch
+from .converting import Work, write_exports
 from .declared import add_flags, checked, chosen, options_of
 from .deferred import deferred
 from .errors import Sdf2vecError
@@ -26,10 +26,11 @@ from .fit.settings import Settings, settings_of
 from .outputs import STREAM, Places, places_of, plan, read_exports
 from .progress import Teller, stopping, telling
 from .report import Report
-from .running import Running
+from .running import Running, check_together
 from .scene import Scene
 from .scene_file import load as load_scene
 from .scene_file import loads as loads_scene
+from .sources import sources_of, standard_input
 
 if TYPE_CHECKING:
     from .roundtrip import Check
@@ -40,14 +41,22 @@ legend: Callable[[], str] = deferred("sdf2vec.roundtrip", "legend")
 escape: Callable[[str], str] = deferred("rich.markup", "escape")
 
 SET_HERE = ("alone", "original")  # options of exports that have no flag
-OF_FITS = ("with_original", "recursive", "skip_existing", "jobs", "report")  # what only fits heed of a run
-PICTURES = ("png", "jpg", "webp")
+OF_FITS = (
+    "with_original",
+    "recursive",
+    "skip_existing",
+    "jobs",
+    "engine",
+    "address",
+    "shard",
+    "report",
+)  # what only fits heed of a run
 DIFFERS = 1  # exit status of a check
 
 
 def main(argv: Sequence[str] | None = None) -> NoReturn:
-    """Entry point: exits with 0; 2 after one line on stderr; 3 where some pictures failed; 70 after a line that names
-    a bug; 130 (SIGTERM: 143) when interrupted."""
+    """Entry point: exits with 0; 1 where a check finds a difference; 2 after one line on stderr; 3 where some pictures
+    failed; 4 where a target was missed; 70 after a line that names a bug; 130 (SIGTERM: 143) when interrupted."""
     guard.run(_run, list(sys.argv[1:] if argv is None else argv))
 
 
@@ -113,6 +122,14 @@ def _add_output(parser: argparse.ArgumentParser) -> None:
     )
 
 
+def _running_of(namespace: argparse.Namespace) -> Running:
+    """What the user chose about the run. Raises Sdf2vecError for what is impossible or without effect."""
+    given = chosen(namespace, Running)
+    running = checked(Running, given)
+    check_together(running, given)
+    return running
+
+
 def _export_options(namespace: argparse.Namespace, targets: Collection[str]) -> Options:
     """What the user chose about exports. Raises Sdf2vecError for impossible choices, and for those without effect."""
     given = chosen(namespace, Options)
@@ -133,7 +150,7 @@ def _convert(arguments: list[str]) -> int:
         parser.error("no picture given")
     options = parser.parse_intermixed_args(arguments)
     places = places_of(options.emit, options.output, "glsl")
-    given, running = chosen(options, Settings), checked(Running, chosen(options, Running))
+    given, running = chosen(options, Settings), _running_of(options)
     also_read = [given[name] for name in ("start", "weights") if name in given]
     jobs = plan(sources_of(options.inputs, running.recursive), places, also_read, running.force)
     work = Work(given, _export_options(options, places.targets), running)
@@ -180,7 +197,8 @@ def _render_command(arguments: list[str]) -> int:
     options_of(Options)["size"].add_flag(parser)
     add_flags(parser, Running, (*OF_FITS, "check"))
     options = parser.parse_args(arguments)
-    return _write_scene_exports(options, places_of(None, options.output, "png", PICTURES))
+    pictures = [name for name, exporter in EXPORTERS.items() if exporter.is_picture]
+    return _write_scene_exports(options, places_of(None, options.output, "png", pictures))
 
 
 def _export_command(arguments: list[str]) -> int:
@@ -200,7 +218,7 @@ def _scene_parser(command: str, does: str) -> argparse.ArgumentParser:
 
 
 def _write_scene_exports(options: argparse.Namespace, places: Places) -> int:
-    running = checked(Running, chosen(options, Running))
+    running = _running_of(options)
     (job,) = plan({options.scene: ""}, places, force=running.force)
     export = _export_options(options, places.targets)
     with telling(running, STREAM in job.outputs.values()) as teller:
@@ -223,7 +241,7 @@ def _check_command(arguments: list[str]) -> int:
     parser.add_argument("--json", action="store_true", help="print a JSON list instead of a table")
     add_flags(parser, Running, (*OF_FITS, "check", "force"))
     options = parser.parse_intermixed_args(arguments)
-    running = checked(Running, chosen(options, Running))
+    running = _running_of(options)
     scene, files = _scene_and_files(options.files)
     if files and options.emit:
         raise Sdf2vecError("either files to check or --emit, not both")

@@ -8,6 +8,7 @@ import sys
 import traceback
 import warnings
 from collections.abc import Callable, Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from typing import Any, NoReturn, TextIO
 
@@ -97,8 +98,9 @@ def problem_of(error: Exception) -> Problem:
 
 def begin_worker(show: bool) -> None:
     """In a process that converts for another one: it leaves Ctrl-C to that, and says what that would say."""
-    signal.signal(signal.SIGINT, signal.SIG_IGN)
     Output.show, warnings.showwarning = show, _warn
+    with suppress(ValueError):  # in a thread: whoever started the process looks after signals
+        signal.signal(signal.SIGINT, signal.SIG_IGN)
 
 
 def _bug(error: Exception) -> str:
