@@ -62,7 +62,7 @@ class Dask:
 
     def ended(self, seconds: float) -> list[tuple[Any, Any]]:
         """See `Workers`. Raises Sdf2vecError where the cluster is gone."""
-        with suppress(TimeoutError):
+        with suppress(TimeoutError), self._client.as_current():
             self._distributed.wait(list(self._under_way), timeout=seconds, return_when="FIRST_COMPLETED")
         if self._client.status != "running":
             raise Sdf2vecError("the Dask cluster is gone; the same command goes on where there is one")
