@@ -275,6 +275,7 @@ precision highp float;
 precision highp int;
 uniform vec3 iResolution;
 uniform float iTime;
+uniform vec4 iMouse;
 out vec4 shadertoy_out_color;
 """
 SHADERTOY_TAIL = """

@@ -5,7 +5,9 @@ from __future__ import annotations
 import logging
 import os
 from collections.abc import Callable
+from concurrent.futures import CancelledError
 from contextlib import suppress
+from queue import Empty, SimpleQueue
 from typing import Any
 
 from ..errors import Sdf2vecError
@@ -25,10 +27,11 @@ class Dask:
     def __init__(self, running: Running, several: int, threads: int) -> None:
         self._distributed = needed("distributed", "dask", "--engine dask")
         self._dask = needed("dask", "dask", "--engine dask")
-        logging.getLogger("distributed").setLevel(logging.CRITICAL)
+        _silence("distributed")
         self._cluster = None if running.address else self._started(several, threads)
         self._client = self._connected(running.address or self._cluster)
         self._under_way: set[Any] = set()
+        self._ended: SimpleQueue[tuple[Any, Any]] = SimpleQueue()
         held = sum(self._client.nthreads().values())
         self.capacity = several if self._cluster else min(running.jobs or AHEAD * held, AHEAD * max(held, 1))
 
@@ -58,24 +61,35 @@ class Dask:
         """Begins a task wherever there is room; the same task twice is done twice."""
         future = self._client.submit(task, *arguments, pure=False)
         self._under_way.add(future)
+        # In a thread, as soon as it ends: until it is fetched a result dies with the worker that holds it.
+        future.add_done_callback(lambda ended: self._ended.put((ended, self._outcome(ended))))
         return future
 
     def ended(self, seconds: float) -> list[tuple[Any, Any]]:
         """See `Workers`. Raises Sdf2vecError where the cluster is gone."""
-        with suppress(TimeoutError), self._client.as_current():
-            self._distributed.wait(list(self._under_way), timeout=seconds, return_when="FIRST_COMPLETED")
-        if self._client.status != "running":
+        found: list[tuple[Any, Any]] = []
+        with suppress(Empty):
+            found.append(self._ended.get(timeout=seconds))
+            while True:
+                found.append(self._ended.get_nowait())
+        if not found and self._client.status != "running":
             raise Sdf2vecError("the Dask cluster is gone; the same command goes on where there is one")
-        done = [future for future in self._under_way if future.status != "pending"]
-        return [(future, self._result(future)) for future in done]
+        return [(future, self._result(future, outcome)) for future, outcome in found]
 
-    def _result(self, future: Any) -> Any:
-        self._under_way.discard(future)
-        if future.status == "finished":
+    def _outcome(self, future: Any) -> Any:
+        try:
             return future.result()
-        if future.status == "error" and not isinstance(future.exception(), self._distributed.KilledWorker):
-            raise future.exception()
-        return None  # killed, or lost with the worker that held its result
+        except Exception as error:
+            return error
+
+    def _result(self, future: Any, outcome: Any) -> Any:
+        self._under_way.discard(future)
+        lost = (self._distributed.KilledWorker, CancelledError)
+        if isinstance(outcome, lost):
+            return None
+        if isinstance(outcome, Exception):
+            raise outcome
+        return outcome
 
     def close(self) -> None:
         """Lets go of the cluster, and ends it where it was started here."""
@@ -84,3 +98,10 @@ class Dask:
         self._client.close()
         if self._cluster:
             self._cluster.close()
+
+
+def _silence(package: str) -> None:
+    """What goes wrong with workers is told in the report, in a line."""
+    for name in list(logging.root.manager.loggerDict):
+        if name.split(".")[0] == package:
+            logging.getLogger(name).setLevel(logging.CRITICAL)

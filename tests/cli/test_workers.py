@@ -2,24 +2,21 @@
 
 import json
 import os
-import signal
 import sys
 import types
 from pathlib import Path
+from typing import Any
 
 import pytest
 
 from sdf2vec import batch
-from sdf2vec.converting import Done
-from sdf2vec.export import EXPORTERS
 from sdf2vec.limits import THREADS
 from sdf2vec.running import Running
 from sdf2vec.workers import working
 from tests.cli.command import SHORT, assert_refused, names
+from tests.cli.conversion import DEADLY, conversion
 
 PICTURES = [f"{number:02}.png" for number in range(12)]
-MARK = EXPORTERS["json"].mark
-DEADLY = ("03.png", "07.png")
 
 
 @pytest.fixture
@@ -30,23 +27,6 @@ def album(folder):
     for name in PICTURES:
         (folder / "album" / name).write_bytes(name.encode())
     return folder
-
-
-def conversion(shard, work, show):
-    """In a worker: notes the try, dies in some first ones, writes what it read."""
-    return [_one(job) for job in shard]
-
-
-def _one(job):
-    source, output = Path(job.source), Path(job.outputs["json"])
-    tried = source.parent.parent / "tries" / source.name
-    with open(tried, "a") as stream:
-        stream.write("x")
-    if source.name in DEADLY and tried.read_text() == "x":
-        os.kill(os.getpid(), signal.SIGKILL)
-    output.parent.mkdir(exist_ok=True)
-    output.write_text(MARK.decode() + source.read_text())
-    return Done(5, 20.0, 0.1, 6, 0.1, stopped=False), [f"{source.name}: converted"]
 
 
 def test_killed_workers_lose_nothing(album, run, monkeypatch):
@@ -87,7 +67,7 @@ class Reference:
 @pytest.fixture
 def ray(monkeypatch):
     """Ray's functions that are used, as its documentation has them: tasks run at once, killed ones raise."""
-    made, asked = types.ModuleType("ray"), []
+    made, asked = types.ModuleType("ray"), list[Any]()
     errors = types.SimpleNamespace(RayError=type("RayError", (Exception,), {}))
     errors.WorkerCrashedError = type("WorkerCrashedError", (errors.RayError,), {})
     errors.RayTaskError = type("RayTaskError", (errors.RayError,), {})
