@@ -1,6 +1,7 @@
 """Exports drawn by real engines against the torch render in float64: the promise of the project."""
 
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -19,14 +20,14 @@ SIZES = [(60, 40), (133, 71), (9, 6)]  # the fitted one, one larger and of anoth
 LARGEST, MEAN = 0.25, 0.05  # levels of 255
 
 
-def text_of(scene: Scene, target: str, **options: str) -> str:
+def text_of(scene: Scene, target: str, **options: Any) -> str:
     text = sdf2vec.export(scene, target, **options)
     assert isinstance(text, str)
     return text
 
 
 def assert_same(scene, target, sizes=SIZES, largest=LARGEST, **options):
-    framing = {"framing": "fit"} if target in ("glsl", "shadertoy", "wgsl") else {}
+    framing: dict[str, Any] = {"framing": "fit"} if target in ("glsl", "shadertoy", "wgsl") else {}
     made = sdf2vec.exported(scene, target, **framing, **options)
     for size in sizes:
         result = compare(ROUND_TRIPS[target][0], made, scene, size)

@@ -107,7 +107,7 @@ def attack_scenes(seed):
     over = "over" if target in ("svg", "data-uri") else None  # an additive scene would be fitted again
     scene = domain.scene(seed, r.choice([1, 3, 6]), r.choice([2, 5]), over)
     assert sdf2vec.loads(sdf2vec.dumps(scene)) == scene
-    options = {
+    options: dict[str, Any] = {
         "glsl": r.choice(list(GLSL_VERSIONS)),
         "layout": r.choice([LAYOUTS[0], *LAYOUTS]),
         "svg_profile": r.choice(["filters", "portable"]),
