@@ -179,7 +179,8 @@ def _sent(shard: Shard, work: Work, is_elsewhere: bool) -> tuple[Shard, Work, bo
 
 
 def _placed(job: Job) -> Job:
-    return Job(whole(job.source), {target: whole(path) for target, path in job.outputs.items()})
+    outputs = {target: whole(path) for target, path in job.outputs.items()}
+    return replace(job, source=whole(job.source), outputs=outputs)
 
 
 def _converted(shard: Shard, work: Work, show: bool) -> list[Result]:

@@ -59,7 +59,7 @@ class ExportKeywords(TypedDict, total=False):
     layout: Literal["auto", "readable", "table", "tiled", "packed", "data"]
     framing: Literal["fit", "cover", "crop"] | None
     animate: bool
-    svg_profile: Literal["filters", "portable"]
+    svg_profile: Literal["filters", "portable", "inkscape"]
     svg_size_limit: int | None
     title: str
     alt: str

@@ -189,7 +189,8 @@ def test_shader_text_is_readable():
     circle = Shape.of("circle", (1, 0.5, 0), center=(0.1, -0.2), radius=0.25)
     text = text_of(Scene(30, 20, (Layer((circle,), 0.05, 0.9),)), "glsl", title="photo.png")
     line = (
-        "  c = over(c, vec3(1.0, 0.5, 0.0), 0.9, coverage(sdCircle(p - vec2(0.1, -0.2), 0.25), 0.05, pixel));"
+        "  c = over(c, vec3(1.0, 0.5, 0.0), 0.9, coverage(sdCircle(p - vec2(0.1, -0.2), 0.25), 0.05, pixel)); "
+        "// 0 circle"
     )
     assert line in text.splitlines()
     assert "// photo.png in 1 shapes, fitted at 30 x 20." in text

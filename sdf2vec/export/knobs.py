@@ -11,6 +11,7 @@ from ..graph import substitute, walk
 from ..operation import FLOAT, VEC2, VEC4
 
 BREATH = 0.004  # scene units
+GROUND = "GROUND"
 AMPLITUDE, SPEED, SOFTNESS, DRAG = (var(name) for name in ("AMPLITUDE", "SPEED", "SOFTNESS", "DRAG"))
 TIME, MOUSE = var("iTime"), var("iMouse", VEC4)  # Shadertoy's names
 
@@ -23,9 +24,10 @@ class Knob(NamedTuple):
     remark: str
 
 
-def knobs_of(ground: str, is_readable: bool, moves: bool) -> list[Knob]:
-    """The names that a text needs, the ground's colour among them; lists of layers leave shapes room for a little."""
-    found = [Knob("GROUND", ground, "behind all shapes, premultiplied")]
+def knobs_of(ground: str, layout: str, moves: bool) -> list[Knob]:
+    """The names that a text needs; the smallest has few. Lists of layers leave shapes room for a little."""
+    is_readable = layout == "readable"
+    found = [] if layout == "packed" else [Knob(GROUND, ground, "behind all shapes, premultiplied")]
     if is_readable or moves:
         how = "is a little" if is_readable else "at most"
         found += [

@@ -23,7 +23,7 @@ from ..paints import FLAT
 from ..scene import MAX_SHAPES, Layer, Scene
 from ..templating import template
 from .exported import Exported
-from .knobs import BREATH, breath, dragged, knobs_of, turned
+from .knobs import BREATH, GROUND, breath, dragged, knobs_of, turned
 from .layouts import (
     EMBEDDED,
     FILE,
@@ -118,13 +118,12 @@ def _shader(scene: Scene, target: Target, options: Options) -> Shader:
     job = _Job(scene, target, options, choice, slack)
     parts = _BODIES[choice.layout if scene.layers else "readable"](job)
     data, error = parts.pop("array", None), parts.pop("error", 0.0)
-    ground = job.say(_background(scene))
     text = template(target.template).render(
         scene=scene,
         title="".join(c if c.isprintable() and c != "\\" else " " for c in options.title),
         size=expression(_size(scene), target.dialect),
-        knobs=knobs_of(ground, job.is_turned, bool(slack)) if target.has_knobs else [],
-        background="GROUND" if target.has_knobs else ground,
+        knobs=knobs_of(job.say(_background(scene)), choice.layout, bool(slack)) if target.has_knobs else [],
+        background=job.say(job.ground),
         version=GLSL_VERSIONS[options.glsl],
         output="gl_FragColor" if options.glsl == "es100" else "fragColor",
         display="" if job.is_displayable else "display",
@@ -203,8 +202,9 @@ class _Job:
 
     @property
     def ground(self) -> Expr:
-        """What is seen where no shape is."""
-        return var("GROUND", VEC4) if self.target.has_knobs else _background(self.scene)
+        """What is seen where no shape is, by its name where it has one."""
+        is_named = self.target.has_knobs and self.choice.layout != "packed"
+        return var(GROUND, VEC4) if is_named else _background(self.scene)
 
     def say(self, expr: Expr) -> str:
         return expression(expr, self.dialect)
