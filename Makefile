@@ -17,9 +17,9 @@ WORKERS ?= auto
 BIN := $(VENV)/bin
 PIP := $(BIN)/python -m pip --disable-pip-version-check
 
-# Software OpenGL and Vulkan, Khronos' GLSL compiler, cairo for the PDF export, librsvg and two browsers.
+# Software OpenGL and Vulkan, Khronos' GLSL compiler, cairo for the PDF export, librsvg, Inkscape and two browsers.
 ENGINES := libegl1 libegl-mesa0 libgl1 libgl1-mesa-dri libgbm1 libgles2 mesa-vulkan-drivers libvulkan1 \
-           glslang-tools libcairo2 librsvg2-bin chromium firefox-esr $(if $(shell command -v npm),,npm)
+           glslang-tools libcairo2 librsvg2-bin inkscape chromium firefox-esr $(if $(shell command -v npm),,npm)
 
 .DEFAULT_GOAL := demo
 .PHONY: demo test bench lint format engines clean distclean

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from base64 import b64encode
 from collections.abc import Callable, Iterable, Sequence
-from typing import TYPE_CHECKING, Any, Literal
+from typing import TYPE_CHECKING, Any, Literal, Unpack
 
 from .declared import checked, documented
 from .deferred import deferred
@@ -12,6 +12,7 @@ from .export.exported import Exported
 from .export.options import Options
 from .exports import Exports
 from .fit.settings import Settings, settings_of
+from .keywords import ExportKeywords, FitKeywords
 from .scene import SHOWN, Scene
 
 if TYPE_CHECKING:
@@ -19,6 +20,7 @@ if TYPE_CHECKING:
     from .fit.auto import Fitted
     from .fit.loop import Progress
     from .image import Picture
+    from .keywords import PictureSource
     from .roundtrip import Check, Size
 
 NOTEBOOK = 512  # shortest side, in pixels, of what a notebook shows
@@ -29,11 +31,11 @@ _check: Callable[..., list[Check]] = deferred("sdf2vec.roundtrip", "check")
 
 
 def fit(
-    image: Any,
+    image: PictureSource,
     shapes: int | Literal["auto"] | None = None,
     *,
     callback: Callable[[Progress], bool] | None = None,
-    **options: Any,
+    **options: Unpack[FitKeywords],
 ) -> Scene:
     """Fits `shapes` shapes to a picture, no more than it needs unless told: the scene of `fitted`."""
     return fitted(image, shapes, callback=callback, **options).scene
@@ -41,11 +43,11 @@ def fit(
 
 @documented(Settings)
 def fitted(
-    image: Any,
+    image: PictureSource,
     shapes: int | Literal["auto"] | None = None,
     *,
     callback: Callable[[Progress], bool] | None = None,
-    **options: Any,
+    **options: Unpack[FitKeywords],
 ) -> Fitted:
     """Fits shapes to a picture, and tells what was decided about their number and whether a target was met.
 
@@ -70,7 +72,7 @@ def render(scene: Scene, width: int | None = None, height: int | None = None) ->
     return _render(scene, width, height)
 
 
-def export(scene: Scene, target: str, **options: Any) -> str | bytes:
+def export(scene: Scene, target: str, **options: Unpack[ExportKeywords]) -> str | bytes:
     """The scene in a target format, a key of `sdf2vec.export.EXPORTERS`: text, or bytes for "pdf" and pictures.
 
     Options: those of `exported`. Raises Sdf2vecError.
@@ -79,7 +81,7 @@ def export(scene: Scene, target: str, **options: Any) -> str | bytes:
 
 
 @documented(Options)
-def exported(scene: Scene, target: str, **options: Any) -> Exported:
+def exported(scene: Scene, target: str, **options: Unpack[ExportKeywords]) -> Exported:
     """The scene in a target format, with the files that belong beside it and what was chosen or given up.
 
     Raises Sdf2vecError for an unknown target and for what can't be exported.

@@ -1,85 +1,30 @@
-"""Many pictures: which they are, what has been done of them, and the rest, one by one or in several processes."""
+"""Many pictures: what has been done of them, and the rest, one by one or by several workers."""
 
 from __future__ import annotations
 
-import glob
 import hashlib
 import math
-import multiprocessing
 import os
-from collections.abc import Iterator, Sequence
-from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
-from concurrent.futures.process import BrokenProcessPool
-from contextlib import contextmanager
-from dataclasses import dataclass, field
-from pathlib import Path
+from collections import Counter, deque
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
+from typing import Any
 
 from . import guard
 from .converting import Done, Work, convert
-from .errors import Sdf2vecError
-from .export import EXPORTERS
 from .files import one_line
 from .guard import Problem
-from .limits import THREADS
 from .outputs import STREAM, Job
 from .progress import Stop, Teller, telling
 from .report import BUG, FAILED, MISSED, OK, SKIPPED, STOPPED, Report, Row
+from .running import PROCESSES
+from .sources import version_of, whole
+from .workers import Workers, working
 
-PICTURES = (".png", ".jpg", ".jpeg", ".webp", ".avif", ".tif", ".tiff", ".gif", ".bmp")
 LISTED = 10  # pictures that a line names
+READ_TOO = ("start", "weights")  # files that a fit reads beside the picture
+TRIES = 3  # how often a picture is begun whose worker is killed
 KILLED = "the process that converted it was killed (too little memory?)"
-
-
-# --- which pictures -------------------------------------------------------------------------------------------
-
-
-def sources_of(inputs: Sequence[str], recursive: bool) -> dict[str, str]:
-    """Every picture, with the folder inside the output folder that its files go to.
-
-    An input is a picture, a folder, or a pattern like `*.png` that the shell has left. Raises Sdf2vecError for one
-    given twice, and for a folder or a pattern without pictures.
-    """
-    twice = next((source for source in inputs if inputs.count(source) > 1), None)
-    if twice is not None:
-        raise Sdf2vecError(f"{one_line(twice)}: is given twice")
-    found: dict[str, str] = {}
-    for source in inputs:
-        if source != STREAM and os.path.isdir(source):
-            found |= _in_folder(source, recursive)
-        elif source != STREAM and glob.has_magic(source) and not os.path.exists(source):
-            found |= dict.fromkeys(_matching(source), "")
-        else:
-            found[source] = ""
-    return found
-
-
-def _in_folder(folder: str, recursive: bool) -> dict[str, str]:
-    paths = sorted(Path(folder).rglob("*") if recursive else Path(folder).iterdir())
-    pictures = {
-        str(path): str(path.parent.relative_to(folder))
-        for path in paths
-        if path.is_file() and _is_picture(path)
-    }
-    if not pictures:
-        deeper = "" if recursive else "; --recursive looks into the folders inside it"
-        raise Sdf2vecError(
-            f"{one_line(folder)}: is a folder without pictures ({', '.join(PICTURES)}){deeper}"
-        )
-    return pictures
-
-
-def _is_picture(path: Path) -> bool:
-    """By its name; not hidden, and not one of our own renders."""
-    name = path.name.lower()
-    ours = any(name.endswith(exporter.suffix) for exporter in EXPORTERS.values())
-    return name.endswith(PICTURES) and not name.startswith(".") and not ours
-
-
-def _matching(pattern: str) -> list[str]:
-    paths = sorted(path for path in glob.glob(pattern, recursive=True) if os.path.isfile(path))
-    if not paths:
-        raise Sdf2vecError(f"{one_line(pattern)}: no such file")
-    return paths
 
 
 # --- what is done with them -----------------------------------------------------------------------------------
@@ -116,12 +61,8 @@ class Batch:
 
     def settings_of(self, job: Job) -> str:
         """What stands for a picture as it is now and all that is done with it."""
-        try:
-            status = os.stat(job.source)
-            picture = (status.st_size, status.st_mtime_ns)
-        except OSError:
-            picture = (0, 0)
-        told = repr((sorted(self.work.fit.items()), self.work.export, sorted(job.outputs.items()), picture))
+        version = version_of(job.source)
+        told = repr((sorted(self.work.fit.items()), self.work.export, sorted(job.outputs.items()), version))
         return hashlib.sha256(told.encode("utf-8", "surrogatepass")).hexdigest()[:16]
 
     def done(self, job: Job, done: Done) -> None:
@@ -154,12 +95,13 @@ class Batch:
 def run_batch(batch: Batch, stop: Stop) -> None:
     """Converts what is to be done, until a stop is asked for."""
     todo = batch.todo()
-    several = min(batch.work.running.jobs, len(todo))
+    running = batch.work.running
+    is_alone = running.engine == PROCESSES and min(running.jobs or 1, len(todo)) == 1
     try:
-        if several > 1:
-            _in_processes(batch, todo, several, stop)
-        else:
+        if is_alone:
             _one_by_one(batch, todo, stop)
+        elif todo:
+            _beside_each_other(batch, todo, stop)
     finally:
         batch.report.write()
 
@@ -179,76 +121,75 @@ def _one_by_one(batch: Batch, todo: list[Job], stop: Stop) -> None:
             return
 
 
-# --- in several processes -------------------------------------------------------------------------------------
+# --- beside each other ----------------------------------------------------------------------------------------
+
+Shard = tuple[Job, ...]  # pictures that a worker gets at once, and that are begun anew when it is killed
+Result = tuple[Done | Problem, list[str]]  # of one picture, and what is to be said of it
 
 
-def _in_processes(batch: Batch, todo: list[Job], several: int, stop: Stop) -> None:
-    """Keeps so many processes busy. Pictures under way when one is killed are begun anew, once, each alone."""
-    waiting = list(reversed(todo))
-    with telling(batch.work.running) as teller:
-        while waiting and not stop.requested:
-            with _workers(several) as pool:
-                killed = _until_killed(batch, waiting, pool, several, stop, teller)
-            for job in killed:
-                with _workers(1) as pool:
-                    again = _until_killed(batch, [job], pool, 1, stop, teller)
-                if again:
-                    batch.failed(job, Problem(f"{job.source}: {KILLED}"))
+def _beside_each_other(batch: Batch, todo: list[Job], stop: Stop) -> None:
+    running = batch.work.running
+    waiting = deque(tuple(todo[i : i + running.shard]) for i in range(0, len(todo), running.shard))
+    with telling(running) as teller, working(running, len(waiting)) as workers:
+        _hand_out(batch, waiting, workers, stop, teller)
 
 
-@contextmanager
-def _workers(several: int) -> Iterator[ProcessPoolExecutor]:
-    """So many processes, which share the cores, and leave Ctrl-C to this one."""
-    threads = min(max(1, (os.cpu_count() or 1) // several), THREADS)
-    context = multiprocessing.get_context("spawn")
-    pool = ProcessPoolExecutor(several, context, _begin_worker, (threads, guard.Output.show))
-    try:
-        yield pool
-    except KeyboardInterrupt:
-        for process in multiprocessing.active_children():
-            process.terminate()
-        raise
-    finally:
-        pool.shutdown(cancel_futures=True)
-
-
-def _begin_worker(threads: int, show: bool) -> None:
-    guard.begin_worker(show)
-    os.environ.setdefault("SDF2VEC_THREADS", str(threads))
-
-
-def _until_killed(
-    batch: Batch, waiting: list[Job], pool: ProcessPoolExecutor, several: int, stop: Stop, teller: Teller
-) -> list[Job]:
-    """Converts the last of the waiting pictures first; those that were under way when a process was killed."""
-    under_way: dict[Future[tuple[Done | Problem, list[str]]], Job] = {}
-    killed: list[Job] = []
-    while (under_way or (waiting and not stop.requested)) and not (killed and not under_way):
-        while waiting and len(under_way) < several and not stop.requested and not killed:
-            job = waiting.pop()
-            try:
-                under_way[pool.submit(_converted, job, batch.work)] = job
-            except BrokenProcessPool:
-                killed.append(job)
+def _hand_out(batch: Batch, waiting: deque[Shard], workers: Workers, stop: Stop, teller: Teller) -> None:
+    """Keeps the workers busy; what a killed one had is begun anew, each picture by itself."""
+    under_way: dict[Any, Shard] = {}
+    killed: Counter[str] = Counter()
+    while under_way or (waiting and not stop.requested):
+        while waiting and len(under_way) < workers.capacity and not stop.requested:
+            shard = waiting.popleft()
+            under_way[workers.start(_converted, *_sent(shard, batch.work, workers.is_elsewhere))] = shard
         teller.counted(len(batch.rows), len(batch.jobs))
-        for future in wait(under_way, 0.2, FIRST_COMPLETED).done:
-            job = under_way.pop(future)
-            try:
-                done, lines = future.result()
-            except BrokenProcessPool:
-                killed.append(job)
-                continue
-            for line in lines:
-                teller.say(line)
-            if isinstance(done, Problem):
-                batch.failed(job, done)
+        for task, results in workers.ended(0.2):
+            shard = under_way.pop(task)
+            if results is None:
+                waiting.extend(_again(batch, shard, killed))
             else:
-                batch.done(job, done)
-    return killed
+                _take_all(batch, shard, results, teller)
 
 
-def _converted(job: Job, work: Work) -> tuple[Done | Problem, list[str]]:
-    """In a process of its own: what came of a picture, or what went wrong; and the lines to say."""
+def _take_all(batch: Batch, shard: Shard, results: Sequence[Result], teller: Teller) -> None:
+    for job, (done, lines) in zip(shard, results, strict=True):
+        for line in lines:
+            teller.say(line)
+        if isinstance(done, Problem):
+            batch.failed(job, done)
+        else:
+            batch.done(job, done)
+
+
+def _again(batch: Batch, shard: Shard, killed: Counter[str]) -> list[Shard]:
+    """The pictures of a worker that was killed, each by itself; without those that it happened to too often."""
+    killed.update(job.source for job in shard)
+    for job in shard:
+        if killed[job.source] >= TRIES:
+            batch.failed(job, Problem(f"{job.source}: {KILLED}"))
+    return [(job,) for job in shard if killed[job.source] < TRIES]
+
+
+def _sent(shard: Shard, work: Work, is_elsewhere: bool) -> tuple[Shard, Work, bool]:
+    """What a worker gets; where its current folder may be another one, with whole paths."""
+    if is_elsewhere:
+        fit = {name: whole(value) if name in READ_TOO else value for name, value in work.fit.items()}
+        shard, work = tuple(map(_placed, shard)), replace(work, fit=fit)
+    return shard, work, guard.Output.show
+
+
+def _placed(job: Job) -> Job:
+    outputs = {target: whole(path) for target, path in job.outputs.items()}
+    return replace(job, source=whole(job.source), outputs=outputs)
+
+
+def _converted(shard: Shard, work: Work, show: bool) -> list[Result]:
+    """In a worker: what came of each picture, or what went wrong; and the lines to say."""
+    guard.begin_worker(show)
+    return [_converted_alone(job, work) for job in shard]
+
+
+def _converted_alone(job: Job, work: Work) -> Result:
     teller = Teller(work.running, lines=[])
     try:
         return convert(job, work, teller, Stop()), teller.lines or []

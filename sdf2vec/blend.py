@@ -9,7 +9,7 @@ import math
 from collections.abc import Callable
 from dataclasses import dataclass
 
-from .expr import Expr, absolute, clamp, const, exp, log, maximum, minimum, mix, select, sigmoid, sin, vec4
+from .expr import Expr, absolute, clamp, const, exp, log, maximum, minimum, mix, select, sigmoid, vec4
 from .function import Function, function, let
 from .operation import FLOAT, VEC2, VEC3, VEC4
 
@@ -204,14 +204,3 @@ def surface_point(uv: Expr, size: Expr) -> Expr:
 def grid_point(p: Expr, low: Expr, cells: Expr) -> Expr:
     """p in a grid that begins at low and has so many cells a unit."""
     return (p - low) * cells
-
-
-# --- motion -------------------------------------------------------------------------------------------------
-
-BREATH = 0.004  # scene units
-
-
-@function("breath", time=FLOAT, index=FLOAT)
-def breath(time: Expr, index: Expr) -> Expr:
-    """How far a shape has drawn in its edge at a time in seconds, each at its own pace."""
-    return BREATH * sin(time * (1.0 + 0.3 * sin(index)) + index)

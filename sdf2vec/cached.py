@@ -61,8 +61,8 @@ def trim(most: int | None = None) -> int:
     return removed
 
 
-def command(parser: argparse.ArgumentParser, arguments: list[str]) -> int:
-    """`sdf2vec cache`: says where the folder is, how large, or empties it."""
+def add_choices(parser: argparse.ArgumentParser) -> None:
+    """The flags of `sdf2vec cache`."""
     choice = parser.add_mutually_exclusive_group(required=True)
     choice.add_argument(
         "--path", action="store_true", help="print the folder that compiled kernels are kept in"
@@ -71,7 +71,10 @@ def command(parser: argparse.ArgumentParser, arguments: list[str]) -> int:
     choice.add_argument(
         "--clear", action="store_true", help="remove them; they are compiled again when needed"
     )
-    options = parser.parse_args(arguments)
+
+
+def command(options: argparse.Namespace) -> int:
+    """`sdf2vec cache`: says where the folder is, how large, or empties it."""
     if options.path:
         print(one_line(str(cache_folder())))
     elif options.size:

@@ -13,9 +13,9 @@ from typing import TYPE_CHECKING, Literal, NoReturn
 
 from msgspec.structs import replace
 
-from . import __version__, cached, guard
-from .batch import Batch, about, about_left, exit_status, run_batch, sources_of
-from .converting import Work, standard_input, write_exports
+from . import __version__, cached, completing, guard
+from .batch import Batch, about, about_left, exit_status, run_batch
+from .converting import Work, write_exports
 from .declared import add_flags, checked, chosen, options_of
 from .deferred import deferred
 from .errors import Sdf2vecError
@@ -26,10 +26,11 @@ from .fit.settings import Settings, settings_of
 from .outputs import STREAM, Places, places_of, plan, read_exports
 from .progress import Teller, stopping, telling
 from .report import Report
-from .running import Running
+from .running import Running, check_together
 from .scene import Scene
 from .scene_file import load as load_scene
 from .scene_file import loads as loads_scene
+from .sources import sources_of, standard_input
 
 if TYPE_CHECKING:
     from .roundtrip import Check
@@ -40,14 +41,22 @@ legend: Callable[[], str] = deferred("sdf2vec.roundtrip", "legend")
 escape: Callable[[str], str] = deferred("rich.markup", "escape")
 
 SET_HERE = ("alone", "original")  # options of exports that have no flag
-OF_FITS = ("with_original", "recursive", "skip_existing", "jobs", "report")  # what only fits heed of a run
-PICTURES = ("png", "jpg", "webp")
+OF_FITS = (
+    "with_original",
+    "recursive",
+    "skip_existing",
+    "jobs",
+    "engine",
+    "address",
+    "shard",
+    "report",
+)  # what only fits heed of a run
 DIFFERS = 1  # exit status of a check
 
 
 def main(argv: Sequence[str] | None = None) -> NoReturn:
-    """Entry point: exits with 0; 2 after one line on stderr; 3 where some pictures failed; 70 after a line that names
-    a bug; 130 (SIGTERM: 143) when interrupted."""
+    """Entry point: exits with 0; 1 where a check finds a difference; 2 after one line on stderr; 3 where some pictures
+    failed; 4 where a target was missed; 70 after a line that names a bug; 130 (SIGTERM: 143) when interrupted."""
     guard.run(_run, list(sys.argv[1:] if argv is None else argv))
 
 
@@ -71,7 +80,7 @@ def _convert_parser() -> argparse.ArgumentParser:
         prog="sdf2vec",
         usage="sdf2vec INPUT... [--emit TARGETS] [-o OUT] [options]",
         description="Fits a few soft geometric shapes to pictures and exports them as mathematics.",
-        epilog="Other commands, each with its own --help: sdf2vec check | render | export | cache. "
+        epilog="Other commands, each with its own --help: sdf2vec check | render | export | cache | completion. "
         "--traceback shows where an error that is a bug came from. Exit status: 0; 2 for what you can mend, 3 where "
         "only some pictures failed, 4 where a target was not reached (the nearest is written), 70 for a bug.",
         formatter_class=argparse.RawDescriptionHelpFormatter,
@@ -113,6 +122,14 @@ def _add_output(parser: argparse.ArgumentParser) -> None:
     )
 
 
+def _running_of(namespace: argparse.Namespace) -> Running:
+    """What the user chose about the run. Raises Sdf2vecError for what is impossible or without effect."""
+    given = chosen(namespace, Running)
+    running = checked(Running, given)
+    check_together(running, given)
+    return running
+
+
 def _export_options(namespace: argparse.Namespace, targets: Collection[str]) -> Options:
     """What the user chose about exports. Raises Sdf2vecError for impossible choices, and for those without effect."""
     given = chosen(namespace, Options)
@@ -133,7 +150,7 @@ def _convert(arguments: list[str]) -> int:
         parser.error("no picture given")
     options = parser.parse_intermixed_args(arguments)
     places = places_of(options.emit, options.output, "glsl")
-    given, running = chosen(options, Settings), checked(Running, chosen(options, Running))
+    given, running = chosen(options, Settings), _running_of(options)
     also_read = [given[name] for name in ("start", "weights") if name in given]
     jobs = plan(sources_of(options.inputs, running.recursive), places, also_read, running.force)
     work = Work(given, _export_options(options, places.targets), running)
@@ -174,22 +191,31 @@ def _read_scene(source: str) -> Scene:
         raise Sdf2vecError(f"standard input: {error}") from None
 
 
-def _render_command(arguments: list[str]) -> int:
+def _render_parser() -> argparse.ArgumentParser:
     parser = _scene_parser("render", "Renders a scene file as PNG, JPEG or WebP.")
     _add_output(parser)
     options_of(Options)["size"].add_flag(parser)
     add_flags(parser, Running, (*OF_FITS, "check"))
-    options = parser.parse_args(arguments)
-    return _write_scene_exports(options, places_of(None, options.output, "png", PICTURES))
+    return parser
 
 
-def _export_command(arguments: list[str]) -> int:
+def _render_command(arguments: list[str]) -> int:
+    options = _render_parser().parse_args(arguments)
+    pictures = [name for name, exporter in EXPORTERS.items() if exporter.is_picture]
+    return _write_scene_exports(options, places_of(None, options.output, "png", pictures))
+
+
+def _export_parser() -> argparse.ArgumentParser:
     parser = _scene_parser("export", "Exports a scene file, without fitting anew.")
     _add_emit(parser, "glsl")
     _add_output(parser)
     add_flags(parser.add_argument_group("run"), Running, OF_FITS)
     add_flags(parser.add_argument_group("export"), Options, SET_HERE)
-    options = parser.parse_args(arguments)
+    return parser
+
+
+def _export_command(arguments: list[str]) -> int:
+    options = _export_parser().parse_args(arguments)
     return _write_scene_exports(options, places_of(options.emit, options.output, "glsl"))
 
 
@@ -200,7 +226,7 @@ def _scene_parser(command: str, does: str) -> argparse.ArgumentParser:
 
 
 def _write_scene_exports(options: argparse.Namespace, places: Places) -> int:
-    running = checked(Running, chosen(options, Running))
+    running = _running_of(options)
     (job,) = plan({options.scene: ""}, places, force=running.force)
     export = _export_options(options, places.targets)
     with telling(running, STREAM in job.outputs.values()) as teller:
@@ -211,7 +237,7 @@ def _write_scene_exports(options: argparse.Namespace, places: Places) -> int:
     return guard.OK
 
 
-def _check_command(arguments: list[str]) -> int:
+def _check_parser() -> argparse.ArgumentParser:
     parser = _Parser(
         prog="sdf2vec check",
         usage="sdf2vec check [FILE...] SCENE [--emit TARGETS] [--json] [-q] [-v]",
@@ -222,8 +248,12 @@ def _check_command(arguments: list[str]) -> int:
     parser.add_argument("--emit", action="append", metavar="TARGETS", help="only these targets")
     parser.add_argument("--json", action="store_true", help="print a JSON list instead of a table")
     add_flags(parser, Running, (*OF_FITS, "check", "force"))
-    options = parser.parse_intermixed_args(arguments)
-    running = checked(Running, chosen(options, Running))
+    return parser
+
+
+def _check_command(arguments: list[str]) -> int:
+    options = _check_parser().parse_intermixed_args(arguments)
+    running = _running_of(options)
     scene, files = _scene_and_files(options.files)
     if files and options.emit:
         raise Sdf2vecError("either files to check or --emit, not both")
@@ -241,9 +271,37 @@ def _check_command(arguments: list[str]) -> int:
     return guard.OK if all(result.verdict != "differs" for result in results) else DIFFERS
 
 
-def _cache_command(arguments: list[str]) -> int:
+def _cache_parser() -> argparse.ArgumentParser:
     about = "Where compiled kernels are kept, how large that is, and how to empty it."
-    return cached.command(_Parser(prog="sdf2vec cache", description=about), arguments)
+    parser = _Parser(prog="sdf2vec cache", description=about)
+    cached.add_choices(parser)
+    return parser
+
+
+def _cache_command(arguments: list[str]) -> int:
+    return cached.command(_cache_parser().parse_args(arguments))
+
+
+def _completion_parser() -> argparse.ArgumentParser:
+    parser = _Parser(
+        prog="sdf2vec completion",
+        description="Prints a script that completes the command line: for bash, source <(sdf2vec completion bash).",
+    )
+    parser.add_argument("shell", help=", ".join(completing.SHELLS))
+    return parser
+
+
+def _completion_command(arguments: list[str]) -> int:
+    parsers = {
+        "": _convert_parser(),
+        "check": _check_parser(),
+        "render": _render_parser(),
+        "export": _export_parser(),
+        "cache": _cache_parser(),
+        "completion": _completion_parser(),
+    }
+    print(completing.script(_completion_parser().parse_args(arguments).shell, parsers), end="")
+    return guard.OK
 
 
 def _scene_and_files(files: Sequence[str]) -> tuple[str, list[str]]:
@@ -298,6 +356,7 @@ COMMANDS: dict[str, Callable[[list[str]], int]] = {
     "render": _render_command,
     "export": _export_command,
     "cache": _cache_command,
+    "completion": _completion_command,
 }
 
 if __name__ == "__main__":

@@ -3,13 +3,10 @@
 from __future__ import annotations
 
 import gzip
-import os
-import sys
 import time
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from pathlib import Path
-from typing import TYPE_CHECKING, Any, BinaryIO
+from typing import TYPE_CHECKING, Any
 
 from msgspec.structs import replace
 
@@ -26,6 +23,7 @@ from .progress import Stop, Teller
 from .running import Running
 from .scene import Scene
 from .scene_file import FORMAT
+from .sources import bytes_of, opened
 
 if TYPE_CHECKING:
     from .fit.auto import Fitted
@@ -66,7 +64,7 @@ def convert(job: Job, work: Work, teller: Teller, stop: Stop) -> Done:
     """Fits one picture and writes its exports. Raises Sdf2vecError."""
     started = time.perf_counter()
     with teller.phase("read"):
-        picture = _read_picture(job.source)
+        picture, data = _read_picture(job.source)
     for note in picture.notes:
         teller.say(note)
     fitting = time.perf_counter()
@@ -84,7 +82,7 @@ def convert(job: Job, work: Work, teller: Teller, stop: Stop) -> Done:
     )
     if fitted.reason:
         teller.say(f"  {fitted.reason}")
-    original = _original(job.source, picture) if work.running.with_original else None
+    original = _original(data(), picture) if work.running.with_original else None
     written = write_exports(scene, job, replace(work.export, original=original), teller)
     seconds = time.perf_counter() - started
     teller.say(f"  {seconds:.1f} s in all{_phases(teller)}")
@@ -109,11 +107,11 @@ def _fit(picture: Picture, work: Work, teller: Teller, stop: Stop) -> Fitted:
     return api.fitted(picture, callback=callback, **work.fit)
 
 
-def _read_picture(source: str) -> Picture:
-    if source == STREAM:
-        return load_picture(standard_input())
+def _read_picture(source: str) -> tuple[Picture, Callable[[], bytes]]:
+    """The picture, and what gives the bytes that it was read from."""
+    place = opened(source)
     try:
-        return load_picture(source)
+        return load_picture(place), lambda: bytes_of(place)
     except Sdf2vecError:
         if _is_scene(source):
             shown = one_line(source)
@@ -121,9 +119,8 @@ def _read_picture(source: str) -> Picture:
         raise
 
 
-def _original(source: str, picture: Picture) -> bytes:
-    """The file's own bytes where a browser shows what was read of it, else a PNG of that."""
-    data = Path(source).read_bytes() if os.path.isfile(source) else b""  # a stream is at its end
+def _original(data: bytes, picture: Picture) -> bytes:
+    """The picture's own bytes where a browser shows what was read of them, else a PNG of that."""
     return data if shown_as(data) else encode_png(picture.pixels)
 
 
@@ -133,13 +130,6 @@ def _is_scene(path: str) -> bool:
             return f'"{FORMAT}"'.encode() in stream.read(200)
     except OSError:
         return False
-
-
-def standard_input() -> BinaryIO:
-    """Standard input as bytes. Raises Sdf2vecError where there is none."""
-    if sys.stdin is None:
-        raise Sdf2vecError("standard input: is closed")
-    return sys.stdin.buffer
 
 
 def _name(source: str) -> str:

@@ -8,7 +8,9 @@ import sys
 import traceback
 import warnings
 from collections.abc import Callable, Sequence
+from contextlib import suppress
 from dataclasses import dataclass
+from functools import cache
 from typing import Any, NoReturn, TextIO
 
 from .errors import Sdf2vecError, Sdf2vecWarning
@@ -95,10 +97,12 @@ def problem_of(error: Exception) -> Problem:
     return Problem(_bug(error), BUG)
 
 
+@cache
 def begin_worker(show: bool) -> None:
-    """In a process that converts for another one: it leaves Ctrl-C to that, and says what that would say."""
-    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    """Once in a process that converts for another one: it leaves Ctrl-C to that, and says what that would say."""
     Output.show, warnings.showwarning = show, _warn
+    with suppress(ValueError):  # in a thread: whoever started the process looks after signals
+        signal.signal(signal.SIGINT, signal.SIG_IGN)
 
 
 def _bug(error: Exception) -> str:

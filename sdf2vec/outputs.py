@@ -9,6 +9,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from urllib.parse import unquote_to_bytes
 
+from . import remote
 from .declared import check_choice
 from .errors import Sdf2vecError
 from .export import EXPORTERS, Exporter
@@ -16,7 +17,6 @@ from .export.exported import Exported
 from .files import one_line, require_writable
 
 STREAM = "-"
-BINARY = ("pdf", "png", "jpg", "webp")  # targets that are no text
 LOOKED_AT = 1 << 20  # bytes at both ends of a file in which a mark is looked for
 
 
@@ -52,7 +52,7 @@ def stem_of(source: str) -> str:
     """What outputs are named after: the same for a picture and for the scene file that was made of it."""
     if source == STREAM:
         return "picture"
-    name = Path(source).name
+    name = remote.name_of(source) if remote.is_url(source) else Path(source).name
     return name.removesuffix(".scene.json") if name.endswith(".scene.json") else Path(name).stem
 
 
@@ -169,7 +169,7 @@ def read_exports(paths: Iterable[str]) -> dict[str, Exported]:
         try:
             data = Path(path).read_bytes()
             there = {ending: Path(p).read_bytes() for ending, p in beside.items() if os.path.isfile(p)}
-            found[target] = Exported(data if target in BINARY else data.decode(), there)
+            found[target] = Exported(data.decode() if exporter.is_text else data, there)
         except (OSError, ValueError) as error:
             reason = getattr(error, "strerror", None) or "is no text"
             raise Sdf2vecError(f"{one_line(path)}: cannot read it ({reason})") from None

@@ -172,7 +172,7 @@ def _expected(scene: Scene, width: int, height: int) -> torch.Tensor:
 
 def _profile(made: Exported) -> str:
     """The profile of a drawing that has been written: without filters every renderer is its judge."""
-    with_filters, portable = SVG_PROFILES
+    with_filters, portable, _ = SVG_PROFILES
     return with_filters if b"filter" in made.raw else portable
 
 
@@ -275,6 +275,7 @@ precision highp float;
 precision highp int;
 uniform vec3 iResolution;
 uniform float iTime;
+uniform vec4 iMouse;
 out vec4 shadertoy_out_color;
 """
 SHADERTOY_TAIL = """
@@ -304,6 +305,7 @@ ROUND_TRIPS: dict[str, tuple[RoundTrip, ...]] = {
     "svg": (
         *_svg("svg", "filters", "resvg", "librsvg", "chromium", "firefox"),
         *_svg("svg", "portable", "resvg", "librsvg", "chromium", "firefox", "cairosvg"),
+        *_svg("svg", "inkscape", "resvg", "inkscape"),
     ),
     "data-uri": (
         RoundTrip("data-uri", "resvg", _decoded, False, "filters"),

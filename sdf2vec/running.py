@@ -2,16 +2,33 @@
 
 from __future__ import annotations
 
+from collections.abc import Collection
 from typing import Annotated
 
 from msgspec import Struct
 
 from .declared import choice, number, plain
+from .errors import Sdf2vecError
 
 CHECKS = ("auto", "off")
 
 
-Jobs = Annotated[int, number("number of processes", "N", 1, 256, "convert so many pictures at once")]
+PROCESSES = "processes"
+ENGINES = (PROCESSES, "dask", "ray")
+
+Jobs = Annotated[
+    int,
+    number(
+        "number of processes",
+        "N",
+        1,
+        65536,
+        "convert so many pictures at once; default: 1, on a cluster all it can",
+    ),
+]
+Shard = Annotated[
+    int, number("number of pictures (shard)", "N", 1, 100_000, "a worker is handed so many pictures at once")
+]
 
 
 class Running(Struct, frozen=True, kw_only=True):
@@ -20,10 +37,21 @@ class Running(Struct, frozen=True, kw_only=True):
     force: Annotated[bool, plain("replace files that sdf2vec has not made")] = False
     recursive: Annotated[bool, plain("look for pictures in the folders inside a folder, too")] = False
     skip_existing: Annotated[bool, plain("leave out pictures whose outputs are all there")] = False
-    jobs: Jobs = 1
+    jobs: Jobs | None = None
+    engine: Annotated[
+        str, choice("engine", "what converts many pictures: processes of this machine, or a cluster", ENGINES)
+    ] = PROCESSES
+    address: Annotated[
+        str | None,
+        plain("of the cluster's scheduler (default: a cluster of --jobs processes here)", "ADDRESS"),
+    ] = None
+    shard: Shard = 1
     report: Annotated[
         str | None,
-        plain("a line a picture: .jsonl or .csv; what it says to be done, and is, is not done again", "FILE"),
+        plain(
+            "a line a picture: .jsonl, .csv or .parquet; what it says to be done, and is, is not done again",
+            "FILE",
+        ),
     ] = None
     with_original: Annotated[bool, plain("a page also holds the picture and a slider to compare")] = False
     check: Annotated[
@@ -31,3 +59,13 @@ class Running(Struct, frozen=True, kw_only=True):
     ] = CHECKS[0]
     quiet: Annotated[bool, plain("print errors only", short="q")] = False
     verbose: Annotated[bool, plain("print how long each phase took, too", short="v")] = False
+
+
+def check_together(running: Running, given: Collection[str]) -> None:
+    """Raises Sdf2vecError for what has no effect beside what else is given."""
+    if running.quiet and running.verbose:
+        raise Sdf2vecError("either -q or -v, not both")
+    if running.engine == PROCESSES and running.address is not None:
+        raise Sdf2vecError("--address has no effect on processes; it is for --engine dask and ray")
+    if running.engine == PROCESSES and "shard" in given and (running.jobs or 1) == 1:
+        raise Sdf2vecError("--shard has no effect on one process; it is for --jobs and --engine dask and ray")

@@ -14,10 +14,12 @@ import pytest
 from PIL import Image
 
 import sdf2vec
-from sdf2vec import Layer, Scene, Sdf2vecError, Shape, quality
+from sdf2vec import Layer, Scene, Sdf2vecError, Shape, keyword_text, keywords, quality
+from sdf2vec.declared import options_of
 from sdf2vec.export import EXPORTERS
+from sdf2vec.export.options import Options
 from sdf2vec.fit.presets import PRESETS
-from sdf2vec.fit.settings import LOSS_NAMES, kinds_of, losses_of, settings_of
+from sdf2vec.fit.settings import LOSS_NAMES, READERS, Settings, kinds_of, losses_of, settings_of
 from sdf2vec.image import load
 from tests.scenes import SOFT
 
@@ -306,7 +308,26 @@ def test_a_wrong_keyword_is_named_with_the_nearest_right_one(levels):
     with pytest.raises(TypeError, match="unknown option 'zzz'; known are shapes, kind"):
         fit(levels, zzz=1)
     with pytest.raises(TypeError, match="unknown option 'framming'; did you mean 'framing'"):
-        sdf2vec.export(red_circle(), "glsl", framming="fit")
+        sdf2vec.export(red_circle(), "glsl", framming="fit")  # type: ignore[call-arg]
+
+
+def test_type_checkers_know_keywords_and_their_values(levels):
+    """Here mypy would complain of a comment that hides nothing, so what is ignored is seen to be found."""
+    with pytest.raises(TypeError, match="unknown option 'prset'; did you mean 'preset'"):
+        sdf2vec.fit(levels, 1, prset="fast")  # type: ignore[call-arg]
+    with pytest.raises(Sdf2vecError, match="unknown compositing 'ovr'"):
+        sdf2vec.fitted(levels, 1, compositing="ovr")  # type: ignore[arg-type]
+    with pytest.raises(Sdf2vecError, match="seed"):
+        sdf2vec.fit(levels, 1, seed="1")  # type: ignore[arg-type]
+    with pytest.raises(Sdf2vecError, match="layout"):
+        sdf2vec.exported(red_circle(), "glsl", layout="radable")  # type: ignore[arg-type]
+
+
+def test_the_keywords_of_type_checkers_are_those_that_are_declared():
+    assert keyword_text.PLACE.read_text() == keyword_text.text(), "run python -m sdf2vec.keyword_text"
+    assert set(keyword_text.READ) == set(READERS)
+    written = {*keywords.ExportKeywords.__annotations__, *keywords.FitKeywords.__annotations__}
+    assert written | {"shapes"} == {*options_of(Options), *options_of(Settings)}
 
 
 @pytest.mark.parametrize(

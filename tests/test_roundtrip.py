@@ -1,6 +1,7 @@
 """Exports drawn by real engines against the torch render in float64: the promise of the project."""
 
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -19,14 +20,14 @@ SIZES = [(60, 40), (133, 71), (9, 6)]  # the fitted one, one larger and of anoth
 LARGEST, MEAN = 0.25, 0.05  # levels of 255
 
 
-def text_of(scene: Scene, target: str, **options: str) -> str:
+def text_of(scene: Scene, target: str, **options: Any) -> str:
     text = sdf2vec.export(scene, target, **options)
     assert isinstance(text, str)
     return text
 
 
 def assert_same(scene, target, sizes=SIZES, largest=LARGEST, **options):
-    framing = {"framing": "fit"} if target in ("glsl", "shadertoy", "wgsl") else {}
+    framing: dict[str, Any] = {"framing": "fit"} if target in ("glsl", "shadertoy", "wgsl") else {}
     made = sdf2vec.exported(scene, target, **framing, **options)
     for size in sizes:
         result = compare(ROUND_TRIPS[target][0], made, scene, size)
@@ -188,7 +189,8 @@ def test_shader_text_is_readable():
     circle = Shape.of("circle", (1, 0.5, 0), center=(0.1, -0.2), radius=0.25)
     text = text_of(Scene(30, 20, (Layer((circle,), 0.05, 0.9),)), "glsl", title="photo.png")
     line = (
-        "  c = over(c, vec3(1.0, 0.5, 0.0), 0.9, coverage(sdCircle(p - vec2(0.1, -0.2), 0.25), 0.05, pixel));"
+        "  c = over(c, vec3(1.0, 0.5, 0.0), 0.9, coverage(sdCircle(p - vec2(0.1, -0.2), 0.25), 0.05, pixel)); "
+        "// 0 circle"
     )
     assert line in text.splitlines()
     assert "// photo.png in 1 shapes, fitted at 30 x 20." in text

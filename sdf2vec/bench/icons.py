@@ -113,7 +113,7 @@ def _fitted(
     started = time.process_time()
     fit = {name: value for name, value in options.items() if name != LIMIT}
     scene = api.fit(picture, shapes, **fit)  # type: ignore[arg-type] # "auto", where it can
-    text = str(api.export(scene, "svg", **{LIMIT: options.get(LIMIT)}))
+    text = str(api.export(scene, "svg", svg_size_limit=options.get(LIMIT)))
     drawing, drawn = measured(text, picture, len(scene.layers), time.process_time() - started)
     return drawing._replace(parameters=parameters_of(scene)), drawn
 

@@ -27,6 +27,7 @@ ENGINES = {
     ),
     "resvg": _engine("resvg", "reinstall it: pip install --force-reinstall resvg_py"),
     "librsvg": _engine("librsvg", "apt-get install librsvg2-bin"),
+    "inkscape": _engine("inkscape", "apt-get install inkscape", is_quick=False),
     "cairosvg": _engine("cairosvg", "CairoSVG needs cairo: apt-get install libcairo2"),
     "pdfium": _engine("pdfium", "reinstall it: pip install --force-reinstall pypdfium2"),
     "chromium": _engine("chromium", CHROMIUM, is_quick=False),

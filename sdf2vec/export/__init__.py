@@ -20,7 +20,7 @@ class Exporter:
 
     `accepts` says which scenes `write` takes, `most_shapes` how many shapes they may have; `heeds` names the options
     that matter to it; other files that it may write end in `beside`. A file that ends in one of `endings` is taken to
-    be for it; one that holds `mark` was made by it.
+    be for it; one that holds `mark` was made by it. `is_text`: it writes text, not bytes; `is_picture`: the render.
     """
 
     suffix: str
@@ -31,6 +31,8 @@ class Exporter:
     other_endings: tuple[str, ...] = ()
     beside: tuple[str, ...] = ()
     mark: bytes = MARK.encode()
+    is_text: bool = True
+    is_picture: bool = False
     most_shapes: Callable[[Options], int] = lambda options: MAX_SHAPES
 
     @property
@@ -78,7 +80,15 @@ def _svg(name: str, suffix: str, about: str, endings: tuple[str, ...] = ()) -> E
 def _raster(name: str, about: str, *endings: str) -> Exporter:
     suffix = f".render.{name}"
     write = deferred("sdf2vec.export.raster", name)
-    return Exporter(suffix, write, about, heeds=("size",), other_endings=(f".{name}", *endings))
+    return Exporter(
+        suffix,
+        write,
+        about,
+        heeds=("size",),
+        other_endings=(f".{name}", *endings),
+        is_text=False,
+        is_picture=True,
+    )
 
 
 EXPORTERS: dict[str, Exporter] = {
@@ -111,6 +121,7 @@ EXPORTERS: dict[str, Exporter] = {
         lambda options: Accepts(("over",)),
         ("svg_size_limit", "title"),
         mark=b"/Producer (" + MARK.encode(),
+        is_text=False,
     ),
     "html": Exporter(
         ".html",

@@ -55,21 +55,17 @@ COSTS = {
 
 @dataclass(frozen=True)
 class Host:
-    """What a target's surroundings allow: layouts, and how many bytes of text weigh as much as a second.
-
-    `frames`: how many of a software engine's frames weigh as much as they take.
-    """
+    """What a target's surroundings allow: layouts, and how many bytes of text weigh as much as a second."""
 
     layouts: tuple[str, ...]
     bytes_a_second: float
-    frames: float = FRAMES
     beside: float = 15.0  # seconds that having to load a second file weighs
 
 
 CONSTANT = ("table", "tiled")
 PASTED = Host(
-    ("readable", "table", "tiled", "packed"), 4000.0, frames=3.0
-)  # seen on a GPU, where frames are quick
+    ("readable", "table", "tiled", "packed"), 4000.0
+)  # unless told readable, or packed: see `shader`
 FILE = Host(("readable", "table", "tiled", "packed", "data"), 100_000.0)
 EMBEDDED = Host(("readable", "data"), 100_000.0, beside=0.0)  # a module that holds its own data
 MODULE = Host(("readable", "data"), 100_000.0)  # WGSL: indexing a constant array hangs some compilers
@@ -118,7 +114,7 @@ def fits_constants(scene: Scene) -> bool:
 
 def _score(choice: Choice, host: Host) -> float:
     """Seconds until a user has seen enough, and the weight of the text; far more beyond what hosts take."""
-    seconds = choice.compile + host.frames * choice.frame + choice.text / host.bytes_a_second
+    seconds = choice.compile + FRAMES * choice.frame + choice.text / host.bytes_a_second
     seconds += host.beside if choice.layout == "data" else 0.0
     return seconds * (10.0 if choice.text > TEXT_LIMIT else 1.0)
 
@@ -144,7 +140,7 @@ class _Costs:
     def text(self, layout: str, tiles: Tiles | None) -> int:
         """Bytes of text."""
         shapes = self.scene.shape_count
-        fixed, each = {"readable": (2500, 105), "packed": (3500, 46), "data": (3000, 0)}.get(
+        fixed, each = {"readable": (2500, 118), "packed": (3500, 46), "data": (3000, 0)}.get(
             layout, (2500, form_of(self.scene).stride * 4 * NUMBER)
         )
         return int(fixed + shapes * each) + (list_bytes(tiles) if tiles and layout == "tiled" else 0)

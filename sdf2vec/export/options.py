@@ -13,7 +13,7 @@ from ..scene import Scene
 
 GLSL_VERSIONS = {"es300": "300 es", "330": "330", "es100": "100"}
 LAYOUTS = ("auto", "readable", "table", "tiled", "packed", "data")
-SVG_PROFILES = ("filters", "portable")
+SVG_PROFILES = ("filters", "portable", "inkscape")
 
 
 Size = Annotated[int, number("size in pixels", "PIXELS", 1, 16384, "shortest side of a PNG, JPEG or WebP")]
@@ -41,7 +41,12 @@ class Options(Struct, frozen=True, kw_only=True):
     ) = None
     animate: Annotated[bool, plain("the shapes of a Shadertoy breathe")] = False
     svg_profile: Annotated[
-        str, choice("SVG profile", "with blur filters, or without, for every renderer", SVG_PROFILES)
+        str,
+        choice(
+            "SVG profile",
+            "with blur filters; without, for every renderer; without what needs crisp edges, for Inkscape",
+            SVG_PROFILES,
+        ),
     ] = SVG_PROFILES[0]
     svg_size_limit: SizeLimit | None = None
     title: Annotated[str, plain("what an export calls the picture (default: its name)", "TEXT")] = "a picture"

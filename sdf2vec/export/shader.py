@@ -8,13 +8,14 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
+from msgspec import structs
 
 from ..arrays import Float32Array, IntArray
-from ..blend import BREATH, COMPOSITING, CROP, FRAMINGS, breath, cropped, display, grid_point, surface_point
+from ..blend import COMPOSITING, CROP, FRAMINGS, cropped, display, grid_point, surface_point
 from ..deferred import deferred
 from ..errors import Sdf2vecError
 from ..expr import Expr, const, var, vec2, vec4
-from ..layer import STILL, Formula, P, constant_row
+from ..layer import PIXEL, STILL, Formula, P, Structure, constant_row
 from ..limits import TEXT_SHAPES
 from ..lower.shader import GLSL, WGSL, Dialect, definition, expression, literal, statements, used_functions
 from ..operation import VEC2, VEC4
@@ -22,6 +23,7 @@ from ..paints import FLAT
 from ..scene import MAX_SHAPES, Layer, Scene
 from ..templating import template
 from .exported import Exported
+from .knobs import BREATH, GROUND, breath, dragged, knobs_of, turned
 from .layouts import (
     EMBEDDED,
     FILE,
@@ -40,6 +42,7 @@ from .tiles import COARSEST, Tiles
 
 packed_text: Callable[..., Any] = deferred("sdf2vec.export.packed_text", "PackedText")  # needs torch
 SEEN = var("{seen}", VEC4)  # where a template puts the colour that is seen
+MOST_READABLE = TEXT_LIMIT // 50  # shapes; none is said in so few bytes
 DATA_WIDTH = 256  # texels in a row of a data texture
 
 
@@ -50,14 +53,14 @@ class Target:
     template: str
     dialect: Dialect
     host: Host
-    time: str = ""  # what holds the seconds, where shapes can move
+    has_knobs: bool = False  # names on top for people to change; it knows the time, and the mouse
     surface: str = ""  # what holds the place on a mesh, 0..1 with y down, where there is no canvas
     framing: str = "fit"  # unless told
 
 
 TARGETS = {
     "glsl": Target("glsl.jinja", GLSL, FILE),
-    "shadertoy": Target("shadertoy.jinja", GLSL, PASTED, time="iTime", framing=CROP),
+    "shadertoy": Target("shadertoy.jinja", GLSL, PASTED, has_knobs=True, framing=CROP),
     "wgsl": Target("wgsl.jinja", WGSL, MODULE),
     "three": Target("three.js.jinja", GLSL, EMBEDDED, surface="place"),
     "godot": Target("godot.jinja", GLSL, OLD, surface="UV"),
@@ -95,8 +98,21 @@ def exported(scene: Scene, options: Options, name: str, suffix: str) -> Exported
 
 
 def shader(scene: Scene, name: str, options: Options) -> Shader:
-    """A scene as a shader: `name` is a key of TARGETS. Raises Sdf2vecError for a layout that the target can't hold."""
+    """A scene as a shader: `name` is a key of TARGETS. Raises Sdf2vecError for a layout that the target can't hold.
+
+    What is pasted is readable unless told, where a host takes so much text; else as small as can be.
+    """
     target = TARGETS[name]
+    if target.host is not PASTED or options.layout != "auto":
+        return _shader(scene, target, options)
+    if scene.shape_count <= MOST_READABLE:
+        made = _shader(scene, target, structs.replace(options, layout="readable"))
+        if len(made.text.encode()) <= TEXT_LIMIT:
+            return made
+    return _shader(scene, target, structs.replace(options, layout="packed"))
+
+
+def _shader(scene: Scene, target: Target, options: Options) -> Shader:
     slack = BREATH if _moves(target, options) else 0.0
     choice = choose(scene, options.layout, _host(target, options), slack)
     job = _Job(scene, target, options, choice, slack)
@@ -106,11 +122,13 @@ def shader(scene: Scene, name: str, options: Options) -> Shader:
         scene=scene,
         title="".join(c if c.isprintable() and c != "\\" else " " for c in options.title),
         size=expression(_size(scene), target.dialect),
-        background=expression(_background(scene), target.dialect),
+        knobs=knobs_of(job.say(_background(scene)), choice.layout, bool(slack)) if target.has_knobs else [],
+        background=job.say(job.ground),
         version=GLSL_VERSIONS[options.glsl],
         output="gl_FragColor" if options.glsl == "es100" else "fragColor",
         display="" if job.is_displayable else "display",
-        cropped=job.say(cropped(SEEN, P, _size(scene), _background(scene))) if job.framing == CROP else "",
+        cropped=job.say(cropped(SEEN, P, _size(scene), job.ground)) if job.framing == CROP else "",
+        dragged=job.say(dragged(P, PIXEL)) if job.is_turned else "",
         place=expression(surface_point(var(target.surface, VEC2), _size(scene)), target.dialect),
         **(dict.fromkeys(("table", "packed", "tiles", "data")) | {"layers": []} | parts),
     )
@@ -148,7 +166,7 @@ def _host(target: Target, options: Options) -> Host:
 
 
 def _moves(target: Target, options: Options) -> bool:
-    if options.animate and not target.time:
+    if options.animate and not target.has_knobs:
         raise Sdf2vecError("only a Shadertoy can be animated; use --emit shadertoy")
     return options.animate
 
@@ -175,7 +193,18 @@ class _Job:
 
     def motion(self, index: Expr) -> Expr:
         """What is added to the distance of the layer whose first shape has an index."""
-        return breath(var(self.target.time), index) if self.slack else STILL
+        return breath(index) if self.slack else STILL
+
+    @property
+    def is_turned(self) -> bool:
+        """Whether the names on top change edges and the place, too."""
+        return self.target.has_knobs and self.choice.layout == "readable"
+
+    @property
+    def ground(self) -> Expr:
+        """What is seen where no shape is, by its name where it has one."""
+        is_named = self.target.has_knobs and self.choice.layout != "packed"
+        return var(GROUND, VEC4) if is_named else _background(self.scene)
 
     def say(self, expr: Expr) -> str:
         return expression(expr, self.dialect)
@@ -200,7 +229,7 @@ class _Job:
         if self.target.surface:
             return [surface_point(P, P)]
         place, pixel_size = FRAMINGS[self.framing]
-        return [place(P, P, P), pixel_size(P, P)]
+        return [place(P, P, P), pixel_size(P, P), *([dragged(P, PIXEL)] if self.is_turned else [])]
 
     @property
     def framing(self) -> str:
@@ -223,17 +252,26 @@ def _background(scene: Scene) -> Expr:
 def _readable(job: _Job) -> dict[str, Any]:
     firsts = first_records(job.scene.layers).tolist()
     layers = [_layer(layer, first, job) for layer, first in zip(job.scene.layers, firsts, strict=True)]
-    return {
-        "functions": job.functions(layers),
-        "layers": [statements("c = {};", layer, job.dialect) for layer in layers],
-    }
+    texts = [statements("c = {};", layer, job.dialect) for layer in layers]
+    remarks = [
+        f"{first} {_named(layer.structure)}" for first, layer in zip(firsts, job.scene.layers, strict=True)
+    ]
+    return {"functions": job.functions(layers), "layers": list(zip(remarks, texts, strict=True))}
+
+
+def _named(structure: Structure) -> str:
+    """The kinds of a layer's shapes, with what is unusual about them."""
+    return ", ".join(
+        " ".join(word for word in (part.join, part.paint, part.kind) if word not in ("", FLAT))
+        for part in structure
+    )
 
 
 def _layer(layer: Layer, first: int, job: _Job) -> Expr:
     """The colour after this layer is laid on `c`."""
     row = constant_row(layer.structure, layer.numbers)
-    formula = Formula(layer.structure, row, job.motion(const(first)))
-    return formula.draw(BELOW, job.scene.compositing)
+    drawn = Formula(layer.structure, row).draw(BELOW, job.scene.compositing)
+    return turned(drawn, first) if job.is_turned else drawn
 
 
 # --- records: a loop over a table, with or without lists ----------------------------------------------------

@@ -7,6 +7,7 @@ import signal
 import subprocess
 import sys
 
+import pyarrow.parquet
 import pytest
 
 import sdf2vec
@@ -48,6 +49,8 @@ def rows_of(path):
     if path.suffix == ".csv":
         with open(path, newline="") as stream:
             return list(csv.DictReader(stream))
+    if path.suffix == ".parquet":
+        return pyarrow.parquet.read_table(path).to_pylist()
     return [json.loads(line) for line in path.read_text().splitlines()]
 
 
@@ -84,7 +87,7 @@ def test_what_exists_is_left_out(album, run, fits):
     assert outcome.out.endswith(b"2 pictures: 1 done, 1 skipped\n")
 
 
-@pytest.mark.parametrize("form", ["jsonl", "csv"])
+@pytest.mark.parametrize("form", ["jsonl", "csv", "parquet"])
 def test_a_report_has_a_line_for_every_picture(album, run, fits, form):
     (album / "album/bad.png").write_bytes(b"no picture")
     outcome = run("album", *SHORT, "--emit", "json,svg", "-o", "out", "--report", f"r.{form}")
@@ -101,7 +104,7 @@ def test_a_report_has_a_line_for_every_picture(album, run, fits, form):
     assert 0 < float(good["seconds"]) < 60
 
 
-@pytest.mark.parametrize("form", ["jsonl", "csv"])
+@pytest.mark.parametrize("form", ["jsonl", "csv", "parquet"])
 def test_a_batch_goes_on_where_it_was(album, run, fits, form):
     """What the report says to be done is not done again, unless picture, options or outputs have changed."""
     command = ("album", *SHORT, *JSON, "-o", "out", "--report", f"r.{form}")
@@ -183,7 +186,7 @@ def test_two_processes_make_the_same_files_as_one(album):
     assert outcomes[1].stdout.count("fitted in") == 4
 
 
-def test_a_killed_process_is_tried_again_once(folder, run, monkeypatch):
+def test_a_picture_that_kills_its_process_is_tried_some_times(folder, run, monkeypatch):
     picture(seed=1).save("other.png")
     monkeypatch.setattr(batch, "_converted", killed)
     outcome = run("photo.jpg", "other.png", *SHORT, *JSON, "--jobs", "2", "--report", "r.jsonl")
@@ -193,13 +196,16 @@ def test_a_killed_process_is_tried_again_once(folder, run, monkeypatch):
         "photo.jpg": "ok",
         "other.png": "failed",
     }
+    assert (folder / "tried").read_text() == "xxx"
 
 
-def killed(job, work):
+def killed(shard, work, show):
     """In a process of its own."""
-    if job.source == "other.png":
+    if shard[0].source == "other.png":
+        with open("tried", "a") as stream:
+            stream.write("x")
         os.kill(os.getpid(), signal.SIGKILL)
-    return converting.Done(3, 20.0, 0.1, 9, 0.1, False), []
+    return [(converting.Done(3, 20.0, 0.1, 9, 0.1, False), [])]
 
 
 def broken(*_):
@@ -233,12 +239,12 @@ def test_a_bug_in_a_process(folder, run, monkeypatch, traceback):
     assert outcome.out == b"2 pictures: 1 done, 1 failed by a bug\n"
 
 
-def with_a_bug(job, work, really=batch._converted):
+def with_a_bug(shard, work, show, really=batch._converted):
     """In a process of its own."""
-    if job.source != "other.png":
-        return killed(job, work)
+    if shard[0].source != "other.png":
+        return killed(shard, work, show)
     batch.convert = broken  # type: ignore[attr-defined]
-    return really(job, work)
+    return really(shard, work, show)
 
 
 def test_a_bad_report_is_refused(folder, run):

@@ -167,6 +167,15 @@ def test_a_page_holds_the_picture_as_it_was_given(folder, run, name):
     assert kept or found[1] == "png"
 
 
+def test_a_page_holds_what_came_by_standard_input_as_it_was(folder, run):
+    data = (folder / "photo.jpg").read_bytes()
+    assert run("-", *SHORT, "--with-original", "-o", "page.html", stdin=data).code == 0
+    assert (
+        f'src="data:image/jpeg;base64,{base64.b64encode(data).decode()}"'
+        in (folder / "page.html").read_text()
+    )
+
+
 def test_a_title_and_a_description(folder, run):
     assert (
         run("photo.jpg", *SHORT, "--title", "My <cat>", "--alt", "asleep", "-o", "a.svg", "-o", "a.html").code

@@ -15,7 +15,7 @@ def svg_engine(request, require_engine):
     return ENGINES[request.param]
 
 
-SVG_ENGINES = ["resvg", "librsvg", "cairosvg", "chromium", "firefox"]
+SVG_ENGINES = ["resvg", "librsvg", "inkscape", "cairosvg", "chromium", "firefox"]
 
 
 @pytest.mark.parametrize("svg_engine", SVG_ENGINES, indirect=True)

@@ -12,7 +12,7 @@ from sdf2vec import Joint, Layer, Scene, Sdf2vecError, Shape
 from sdf2vec.engines import glslang_validate
 from sdf2vec.export import packing
 from sdf2vec.export.exported import Exported
-from sdf2vec.export.layouts import FILE, MODULE, OLD, PASTED, TEXT_LIMIT, choose
+from sdf2vec.export.layouts import FILE, MODULE, OLD, TEXT_LIMIT, choose
 from sdf2vec.export.options import Options
 from sdf2vec.export.shader import shader, short, words_of
 from sdf2vec.export.tiles import COARSEST, bin_layers, scene_grid
@@ -324,7 +324,6 @@ def test_the_choice_follows_size_and_host():
     assert choose(few, "auto", FILE).layout == "readable"
     assert choose(some, "auto", FILE).layout == "tiled"
     assert choose(lots, "auto", FILE).layout == "data"
-    assert choose(some, "auto", PASTED).layout == "packed"
     assert choose(lots, "auto", MODULE).layout == "data"
     assert choose(lots, "auto", OLD).layout == "readable"
     with pytest.raises(Sdf2vecError, match="choose from readable, data"):

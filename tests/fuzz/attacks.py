@@ -13,7 +13,7 @@ import sdf2vec
 from sdf2vec import Sdf2vecError
 from sdf2vec.declared import checked
 from sdf2vec.export import EXPORTERS
-from sdf2vec.export.options import GLSL_VERSIONS, LAYOUTS, Options
+from sdf2vec.export.options import GLSL_VERSIONS, LAYOUTS, SVG_PROFILES, Options
 from sdf2vec.fit.settings import Settings, settings_of
 from sdf2vec.image import load
 from tests.fuzz import domain
@@ -107,10 +107,10 @@ def attack_scenes(seed):
     over = "over" if target in ("svg", "data-uri") else None  # an additive scene would be fitted again
     scene = domain.scene(seed, r.choice([1, 3, 6]), r.choice([2, 5]), over)
     assert sdf2vec.loads(sdf2vec.dumps(scene)) == scene
-    options = {
+    options: dict[str, Any] = {
         "glsl": r.choice(list(GLSL_VERSIONS)),
         "layout": r.choice([LAYOUTS[0], *LAYOUTS]),
-        "svg_profile": r.choice(["filters", "portable"]),
+        "svg_profile": r.choice(SVG_PROFILES),
         "svg_size_limit": r.choice([None, None, 2000, 20_000]),
         "title": r.choice(["a", "</script>-->]]>*/\n\"'&\u202e\udc80"]),
         "size": r.choice([None, 1, 30]) if target == "png" else None,

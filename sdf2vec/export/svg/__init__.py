@@ -18,7 +18,7 @@ from .layers import drawing
 from .plan import DETAILS, Detail, Planner
 from .writer import MARGINS, Style, written
 
-PORTABLE = "portable"
+PORTABLE, INKSCAPE = "portable", "inkscape"
 IN_QUOTES = "!$'()*+,;=:@/?"  # what a URI takes as it is, but for "&", which HTML does not
 ACCEPTED = ("over",)
 CREATED = re.compile(rb"(/CreationDate \(D:)([^)]*)")
@@ -92,7 +92,7 @@ def pdf(scene: Scene, options: Options) -> Exported:
 def _planner(scene: Scene, profile: str) -> Planner:
     if scene.compositing not in ACCEPTED:
         raise Sdf2vecError(f"svg: takes scenes under {' or '.join(ACCEPTED)}, not {scene.compositing}")
-    return Planner(scene, profile != PORTABLE)
+    return Planner(scene, profile != PORTABLE, profile != INKSCAPE)
 
 
 def _text(planner: Planner, detail: Detail, options: Options) -> str:

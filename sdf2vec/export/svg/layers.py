@@ -96,7 +96,7 @@ class Painter:
     def _soft(self, layer: Layer, index: int, fill: Color | LinearGradient) -> Item | None:
         canvas = self.plan.canvas
         outline = edge_of(layer, 0.0)
-        if outline is not None and not isinstance(fill, LinearGradient):
+        if outline is not None and self.plan.is_crisp and not isinstance(fill, LinearGradient):
             edge = SoftEdge(fill, layer.opacity, layer.falloff * canvas.unit, self.plan.stops[index])
             if (made := core(outline)) is not None:
                 return sliced(canvas.places(made[0]), made[1] * canvas.unit, edge, canvas)

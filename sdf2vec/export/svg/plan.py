@@ -59,7 +59,7 @@ DETAILS = (
 class Plan:
     """The canvas, which layers are soft, which are drawn by a blur, how many stops or bands each layer's edge has.
 
-    `rings`: whether wide bands are rings.
+    `rings`: whether wide bands are rings. `is_crisp`: whether pixels can be kept to one slice each.
     """
 
     canvas: Canvas
@@ -69,10 +69,12 @@ class Plan:
     bands: list[int]
     rings: bool
     samples: LayerSamples
+    is_crisp: bool = True
 
     def is_rounded_down(self, index: int, layer: Layer) -> bool:
         """Whether a layer is drawn by what 8 bits take from most: a blur, or bands."""
-        banded = (self.soft[index] or layer.is_patch) and edge_of(layer, 0.0) is None
+        sliced = self.is_crisp and edge_of(layer, 0.0) is not None
+        banded = (self.soft[index] or layer.is_patch) and not sliced
         return index in self.blurred or banded
 
 
@@ -82,6 +84,7 @@ class Planner:
 
     scene: Scene
     filters: bool
+    is_crisp: bool = True
     canvas: Canvas = field(init=False)
 
     def __post_init__(self) -> None:
@@ -139,7 +142,16 @@ class Planner:
         else:
             canvas = Canvas.of(scene, detail.coarser)
             blurred = self._near_enough(detail.target) if self.filters else {}
-        return Plan(canvas, self.soft, blurred, stops, bands, self.filters, self.samples)
+        return Plan(
+            canvas,
+            self.soft,
+            blurred,
+            stops,
+            bands,
+            self.filters and self.is_crisp,
+            self.samples,
+            self.is_crisp,
+        )
 
     def _near_enough(self, target: float) -> dict[int, Blurred]:
         """The blurs of soft layers but the worst, which are given up until the target in dB is reached."""

@@ -38,6 +38,22 @@ def test_bands_leave_no_gaps(engine, profile, require_engine):
         assert abs(off.mean()) <= (0.5 if profile == "filters" else 2.0) / 255
 
 
+def test_inkscape_sees_no_seams_in_its_profile(require_engine):
+    """It smooths the edges of slices, too, whatever they ask for: light shines through where they meet."""
+    require_engine("inkscape")
+    box = Shape.of(
+        "box", (0.1, 0.1, 0.1), center=(0.02, 0.01), half_size=(0.4, 0.3), angle=0.4, corner_radius=0
+    )
+    scene = Scene(150, 100, (Layer((box,), 0.06),), (1.0, 1.0, 1.0))
+    assert "crispEdges" not in text_of(scene, svg_profile="inkscape")
+    seen = {
+        profile: 255 * np.abs(off_in("inkscape", scene, svg_profile=profile)).max()
+        for profile in ("portable", "inkscape")
+    }
+    assert seen["inkscape"] <= 10
+    assert seen["portable"] >= 20, "it is fit for Inkscape now: README and docs/svg.md may say so"
+
+
 @pytest.mark.parametrize("engine", ["resvg", "librsvg", "chromium", "firefox", "cairosvg"])
 @pytest.mark.parametrize("falloff", [3.0, 5.0, 8.0])
 def test_the_bands_of_a_narrow_edge_are_not_too_many(engine, falloff, require_engine):
