@@ -20,7 +20,7 @@ from ..quality import psnr_of, quality
 from ..render.tensors import SceneTensors, to_scene
 from ..scene import Scene
 from ..threads import threads_of_its_own
-from .initialization import Layers
+from .initialization import Layers, background_of
 from .joining import Search
 from .loop import Callback, Progress, Stopped, fit_picture, scaled, view_of
 from .matching_pursuit import Painted, find_discs
@@ -190,9 +190,9 @@ class Drawing:
 
 
 def ground_of(target: torch.Tensor) -> torch.Tensor:
-    """The most common colour of a picture [C, H, W] where it dominates, else the mean; nothing where it has alpha."""
+    """The most common colour of a picture [C, H, W] where it dominates, else the mean."""
     if len(target) == 4:
-        return torch.zeros(4)
+        return background_of(target)
     colors = target.flatten(1).T
     common = common_color(colors, torch.ones(len(colors)))
     near = (colors - common).abs().amax(1) < LEVELS
