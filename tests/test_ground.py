@@ -73,7 +73,7 @@ def test_shaders_draw_it(target, compositing, require_engine):
 def test_drawings_show_it(target, engine, options, require_engine):
     trip = next(trip for trip in ROUND_TRIPS[target] if trip.engine == engine)
     require_engine(engine)
-    scene = Scene(60, 40, (replace(DISC, falloff=0.1),), SHEER)
+    scene = Scene(60, 40, (DISC,), SHEER)
     made = Exports(scene).export(target, Options(**options))
     assert compare(trip, made, scene, (60, 40)).psnr > 40.0
 
