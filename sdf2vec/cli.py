@@ -15,6 +15,7 @@ from msgspec.structs import replace
 
 from . import __version__, cached, guard
 from .batch import Batch, about, about_left, exit_status, run_batch, sources_of
+from .checkpoint import OFF
 from .converting import Work, standard_input, write_exports
 from .declared import add_flags, checked, chosen, options_of
 from .deferred import deferred
@@ -40,7 +41,14 @@ legend: Callable[[], str] = deferred("sdf2vec.roundtrip", "legend")
 escape: Callable[[str], str] = deferred("rich.markup", "escape")
 
 SET_HERE = ("alone", "original")  # options of exports that have no flag
-OF_FITS = ("with_original", "recursive", "skip_existing", "jobs", "report")  # what only fits heed of a run
+OF_FITS = (
+    "with_original",
+    "recursive",
+    "skip_existing",
+    "jobs",
+    "report",
+    "checkpoint",
+)  # of a run, for fits
 PICTURES = ("png", "jpg", "webp")
 DIFFERS = 1  # exit status of a check
 
@@ -135,7 +143,8 @@ def _convert(arguments: list[str]) -> int:
     places = places_of(options.emit, options.output, "glsl")
     given, running = chosen(options, Settings), checked(Running, chosen(options, Running))
     also_read = [given[name] for name in ("start", "weights") if name in given]
-    jobs = plan(sources_of(options.inputs, running.recursive), places, also_read, running.force)
+    sources = sources_of(options.inputs, running.recursive)
+    jobs = plan(sources, places, also_read, running.force, running.checkpoint)
     work = Work(given, _export_options(options, places.targets), running)
     _check_settings(work, places)
     batch = Batch(jobs, work, Report(running.report, running.force))
@@ -201,7 +210,7 @@ def _scene_parser(command: str, does: str) -> argparse.ArgumentParser:
 
 def _write_scene_exports(options: argparse.Namespace, places: Places) -> int:
     running = checked(Running, chosen(options, Running))
-    (job,) = plan({options.scene: ""}, places, force=running.force)
+    (job,) = plan({options.scene: ""}, places, force=running.force, checkpoint=OFF)
     export = _export_options(options, places.targets)
     with telling(running, STREAM in job.outputs.values()) as teller:
         started = time.perf_counter()

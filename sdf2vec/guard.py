@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
+import multiprocessing
 import os
 import signal
 import sys
+import threading
 import traceback
 import warnings
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from multiprocessing.process import BaseProcess
 from typing import Any, NoReturn, TextIO
 
 from .errors import Sdf2vecError, Sdf2vecWarning
@@ -96,9 +99,17 @@ def problem_of(error: Exception) -> Problem:
 
 
 def begin_worker(show: bool) -> None:
-    """In a process that converts for another one: it leaves Ctrl-C to that, and says what that would say."""
+    """In a process that converts for another one: it leaves Ctrl-C to that, says what that would say, ends with it."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
+    if parent := multiprocessing.parent_process():
+        threading.Thread(target=_end_with, args=(parent,), daemon=True).start()
     Output.show, warnings.showwarning = show, _warn
+
+
+def _end_with(parent: BaseProcess) -> NoReturn:
+    """Else a worker of a run that was killed would wait for work for ever."""
+    parent.join()
+    os._exit(BUG)
 
 
 def _bug(error: Exception) -> str:

@@ -167,6 +167,9 @@ class Drawing:
         except Stopped:
             self.stopped = True
         self.error = error_of(self.scene, self.sizes.last)
+        return self._made()
+
+    def _made(self) -> Scene:
         return to_scene(self.scene, self.picture.width, self.picture.height)
 
     def _finish(self) -> None:
@@ -185,7 +188,8 @@ class Drawing:
 
     def _tick(self, loss: float) -> None:
         count = self.scene.layer_count
-        if self.callback(Progress("finding shapes", count, max(count + 1, self.settings.most), loss)):
+        steps = max(count + 1, self.settings.most)
+        if self.callback(Progress("finding shapes", count, steps, loss, self._made)):
             raise Stopped
 
 

@@ -46,12 +46,13 @@ SAME_SHAPE = 0.01  # scene units by which a start scene's canvas may differ
 
 @dataclass(frozen=True)
 class Progress:
-    """Where a fit stands, and on which device; `step` counts over all phases."""
+    """Where a fit stands, and on which device; `step` counts over all phases. `scene()` is the scene as it is now."""
 
     phase: str
     step: int
     steps: int
     loss: float
+    scene: Callable[[], Scene]
     device: str = "cpu"
 
 
@@ -71,7 +72,7 @@ def fit_picture(picture: Picture, settings: Settings, callback: Callback = lambd
     with threads_of_its_own():
         fit = Fit(picture, settings, callback)
         fit.run()
-    return to_scene(fit.tensors, picture.width, picture.height)
+    return fit.scene()
 
 
 @dataclass(frozen=True)
@@ -98,7 +99,8 @@ class Fit:
         self.backend: Backend = choose(settings.device)
         self.generator = torch.Generator().manual_seed(settings.seed)
         self.pixels = picture.premultiplied
-        self.pixel = 1.0 / min(picture.width, picture.height)
+        self.sides = (picture.width, picture.height)
+        self.pixel = 1.0 / min(self.sides)
         self.size = (picture.width * self.pixel, picture.height * self.pixel)
         self.wanted = settings.most // settings.union  # layers
         self.done, self.steps, self.stopped = 0, self._count_steps(), False
@@ -112,6 +114,10 @@ class Fit:
         """The phases of this fit; one that goes on from a scene leaves the first out."""
         phases = self.preset.phases
         return phases if self.settings.start is None or len(phases) == 1 else phases[1:]
+
+    def scene(self) -> Scene:
+        """The scene as it is now."""
+        return to_scene(self.tensors, *self.sides)
 
     def run(self) -> None:
         """The whole fit, in place. Also when it is stopped, no shape stays too thin and colours are restricted."""
@@ -214,7 +220,7 @@ class Fit:
 
     def _announce_compiling(self) -> None:
         if not self.backend.is_compiled(self.tensors, self.pixels.shape[2]):
-            self.callback(Progress("compiling kernels (once)", 0, self.steps, math.nan))
+            self.callback(Progress("compiling kernels (once)", 0, self.steps, math.nan, self.scene))
 
     def _stage(self, phase: Phase) -> Stage:
         view, device = view_of(self.pixels, self.settings, self._resolution(phase)), self.backend.device
@@ -345,7 +351,7 @@ class Fit:
         self.done = last
 
     def _report(self, phase: Phase, loss: float) -> None:
-        if self.callback(Progress(phase.name, self.done, self.steps, loss, self.backend.device)):
+        if self.callback(Progress(phase.name, self.done, self.steps, loss, self.scene, self.backend.device)):
             self.stopped = True
             raise Stopped
 
