@@ -13,7 +13,8 @@ SHARES = {
     "arrays": (500, 2.0),
     "scenes": (60, 10.0),
     "options": (1000, 2.0),
-    "fits": (20, 3.0),
+    "fits": (20, 2.0),
+    "kills": (6, 3.0),
 }
 """How many seeds, and after how many seconds no further one is begun."""
 
