@@ -15,6 +15,7 @@ from msgspec.structs import replace
 
 from . import __version__, cached, completing, guard
 from .batch import Batch, about, about_left, exit_status, run_batch
+from .checkpoint import OFF
 from .converting import Work, write_exports
 from .declared import add_flags, checked, chosen, options_of
 from .deferred import deferred
@@ -50,6 +51,7 @@ OF_FITS = (
     "address",
     "shard",
     "report",
+    "checkpoint",
 )  # what only fits heed of a run
 DIFFERS = 1  # exit status of a check
 
@@ -152,7 +154,8 @@ def _convert(arguments: list[str]) -> int:
     places = places_of(options.emit, options.output, "glsl")
     given, running = chosen(options, Settings), _running_of(options)
     also_read = [given[name] for name in ("start", "weights") if name in given]
-    jobs = plan(sources_of(options.inputs, running.recursive), places, also_read, running.force)
+    sources = sources_of(options.inputs, running.recursive)
+    jobs = plan(sources, places, also_read, running.force, running.checkpoint)
     work = Work(given, _export_options(options, places.targets), running)
     _check_settings(work, places)
     batch = Batch(jobs, work, Report(running.report, running.force))
@@ -227,7 +230,7 @@ def _scene_parser(command: str, does: str) -> argparse.ArgumentParser:
 
 def _write_scene_exports(options: argparse.Namespace, places: Places) -> int:
     running = _running_of(options)
-    (job,) = plan({options.scene: ""}, places, force=running.force)
+    (job,) = plan({options.scene: ""}, places, force=running.force, checkpoint=OFF)
     export = _export_options(options, places.targets)
     with telling(running, STREAM in job.outputs.values()) as teller:
         started = time.perf_counter()

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 from msgspec.structs import replace
 
 from . import api, guard
+from .checkpoint import Checkpoint
 from .deferred import deferred
 from .errors import Sdf2vecError
 from .export import EXPORTERS
@@ -68,8 +69,11 @@ def convert(job: Job, work: Work, teller: Teller, stop: Stop) -> Done:
     for note in picture.notes:
         teller.say(note)
     fitting = time.perf_counter()
+    checkpoint = Checkpoint(job.checkpoint)
+    if left := checkpoint.begin(work.fit.get("start")):
+        teller.say(left)
     with teller.phase("fit"):
-        fitted = _fit(picture, work, teller, stop)
+        fitted = _fit(picture, work, teller, stop, checkpoint)
         scene = fitted.scene
     seconds = time.perf_counter() - fitting
     with teller.phase("measure"):
@@ -84,6 +88,7 @@ def convert(job: Job, work: Work, teller: Teller, stop: Stop) -> Done:
         teller.say(f"  {fitted.reason}")
     original = _original(data(), picture) if work.running.with_original else None
     written = write_exports(scene, job, replace(work.export, original=original), teller)
+    checkpoint.remove()
     seconds = time.perf_counter() - started
     teller.say(f"  {seconds:.1f} s in all{_phases(teller)}")
     return Done(scene.shape_count, quality.psnr, quality.flip, written, seconds, stop.requested, fitted.met)
@@ -99,9 +104,10 @@ def _described(quality: Quality, picture: Picture) -> str:
     return f"PSNR {psnr:.2f} dB, FLIP {flip:.4f}{where}"
 
 
-def _fit(picture: Picture, work: Work, teller: Teller, stop: Stop) -> Fitted:
+def _fit(picture: Picture, work: Work, teller: Teller, stop: Stop, checkpoint: Checkpoint) -> Fitted:
     def callback(progress: Progress) -> bool:
         teller.step(progress)
+        checkpoint.see(progress)
         return stop.requested
 
     return api.fitted(picture, callback=callback, **work.fit)

@@ -2,15 +2,18 @@
 
 from __future__ import annotations
 
+import multiprocessing
 import os
 import signal
 import sys
+import threading
 import traceback
 import warnings
 from collections.abc import Callable, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
 from functools import cache
+from multiprocessing.process import BaseProcess
 from typing import Any, NoReturn, TextIO
 
 from .errors import Sdf2vecError, Sdf2vecWarning
@@ -99,10 +102,18 @@ def problem_of(error: Exception) -> Problem:
 
 @cache
 def begin_worker(show: bool) -> None:
-    """Once in a process that converts for another one: it leaves Ctrl-C to that, and says what that would say."""
+    """Once in a process that converts for another one: it leaves Ctrl-C to that, speaks for it, ends with it."""
+    if parent := multiprocessing.parent_process():
+        threading.Thread(target=_end_with, args=(parent,), daemon=True).start()
     Output.show, warnings.showwarning = show, _warn
     with suppress(ValueError):  # in a thread: whoever started the process looks after signals
         signal.signal(signal.SIGINT, signal.SIG_IGN)
+
+
+def _end_with(parent: BaseProcess) -> NoReturn:
+    """Else a worker of a run that was killed would wait for work for ever."""
+    parent.join()
+    os._exit(BUG)
 
 
 def _bug(error: Exception) -> str:

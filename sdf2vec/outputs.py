@@ -10,6 +10,7 @@ from pathlib import Path
 from urllib.parse import unquote_to_bytes
 
 from . import remote
+from .checkpoint import OFF, SUFFIX
 from .declared import check_choice
 from .errors import Sdf2vecError
 from .export import EXPORTERS, Exporter
@@ -26,6 +27,7 @@ class Job:
 
     source: str
     outputs: Mapping[str, str]  # target → path or "-"
+    checkpoint: str = ""  # path; empty for none
 
 
 @dataclass(frozen=True)
@@ -180,9 +182,15 @@ def read_exports(paths: Iterable[str]) -> dict[str, Exported]:
 
 
 def plan(
-    sources: Mapping[str, str], places: Places, also_read: Iterable[str] = (), force: bool = False
+    sources: Mapping[str, str],
+    places: Places,
+    also_read: Collection[str] = (),
+    force: bool = False,
+    checkpoint: str | None = None,
 ) -> list[Job]:
     """The files of each input, which is given with the folder inside the output folder that its files go to.
+
+    `checkpoint`: the file of the one input's, "off", or None for one beside the outputs of each.
 
     Raises Sdf2vecError, before anything is written, when two exports would share a file, when one can't be written, and
     when one would replace an input, or (without `force`) a file that this program has not made.
@@ -192,7 +200,10 @@ def plan(
         raise Sdf2vecError(
             f"{whole}: takes one input and one target, {len(sources)} inputs are given; give a folder with -o"
         )
-    jobs = [Job(source, places.outputs(source, within)) for source, within in sources.items()]
+    if len(sources) > 1 and checkpoint not in (None, OFF):
+        raise Sdf2vecError(f"{one_line(checkpoint)}: is a checkpoint of one input, {len(sources)} are given")
+    outputs = {source: places.outputs(source, within) for source, within in sources.items()}
+    jobs = [Job(source, made, _checkpoint(made, checkpoint)) for source, made in outputs.items()]
     read = {str(Path(path).resolve()) for path in (*sources, *also_read) if path != STREAM}
     taken: dict[str, str] = {}
     for job in jobs:
@@ -201,7 +212,20 @@ def plan(
                 _claim(path, job.source, taken, read)
                 if not force:
                     _refuse_foreign(path, EXPORTERS[target])
+        if job.checkpoint:
+            going_on = {str(Path(path).resolve()) for path in also_read}  # from it
+            _claim(job.checkpoint, job.source, taken, read - going_on)
+            if not force:
+                _refuse_foreign(job.checkpoint, EXPORTERS["json"])
     return jobs
+
+
+def _checkpoint(outputs: Mapping[str, str], given: str | None) -> str:
+    """The path of a checkpoint: beside the first output, named after it, unless told."""
+    if given is not None:
+        return "" if given == OFF else given
+    beside = [(target, path) for target, path in outputs.items() if path != STREAM and not _is_sink(path)]
+    return beside_of(beside[0][1], EXPORTERS[beside[0][0]].suffix, SUFFIX) if beside else ""
 
 
 def _claim(path: str, source: str, taken: dict[str, str], read: set[str]) -> None:

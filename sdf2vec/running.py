@@ -53,6 +53,14 @@ class Running(Struct, frozen=True, kw_only=True):
             "FILE",
         ),
     ] = None
+    checkpoint: Annotated[
+        str | None,
+        plain(
+            "save a fit that takes long every 30 s, to go on from with --start should it be killed; removed at the end "
+            "(default: beside the outputs; off: nowhere)",
+            "FILE",
+        ),
+    ] = None
     with_original: Annotated[bool, plain("a page also holds the picture and a slider to compare")] = False
     check: Annotated[
         str, choice("check", "draw each export on a quick engine that is here, to say how near it is", CHECKS)

@@ -33,9 +33,11 @@ MAX_JOINED = 128  # shapes in one layer: each is a term of one formula
 Side = Annotated[int, Meta(ge=1, le=CANVAS_SIDE)]  # pixels
 Joined = Annotated[list[Any], Meta(min_length=1, max_length=MAX_JOINED)]
 Color = tuple[float, float, float]
+Ground = Color | tuple[float, float, float, float] | None  # opaque, with an alpha of its own, none
 Value = float | tuple[float, ...]  # of a parameter
 BLACK: Color = (0.0, 0.0, 0.0)
 GROUND = Parameter("background", BACKGROUND, BLACK)
+SHEER = Parameter("background", BACKGROUND, (*BLACK, 0.0))  # with an alpha of its own
 OPTIONAL = (*LOOK, JOIN)  # where no value is given, it is that of `start`
 
 
@@ -333,14 +335,15 @@ class Scene:
     """Layers in draw order on a canvas of `width` × `height` pixels (the size of the fitted picture).
 
     Coordinates have their origin at the centre, y down; one unit is the shortest side. `background` is a
-    colour, or None for transparent. `compositing` is "over" (colours 0..1) or "additive" (colours −1..1).
+    colour, one with an alpha (straight RGBA), or None for transparent: an alpha of 1 is left out, and one of 0 is None.
+    `compositing` is "over" (colours 0..1) or "additive" (colours −1..1).
     Raises SceneError.
     """
 
     width: int
     height: int
     layers: tuple[Layer, ...]
-    background: Color | None = BLACK
+    background: Ground = BLACK
     compositing: str = OVER
 
     def __post_init__(self) -> None:
@@ -348,8 +351,7 @@ class Scene:
             with within(name):
                 checked(Side, getattr(self, name))
         one_of(self.compositing, "compositing", COMPOSITING)
-        if self.background is not None:
-            object.__setattr__(self, "background", numbers_of((GROUND,), {GROUND.name: self.background}))
+        object.__setattr__(self, "background", _checked_ground(self.background))
         if self.shape_count > MAX_SHAPES:
             raise SceneError("layers", f"at most {MAX_SHAPES} shapes, got {self.shape_count}")
         if not COMPOSITING[self.compositing].signed:
@@ -361,7 +363,7 @@ class Scene:
         told = f"{self.shape_count} shapes in {len(self.layers)} layers" + (
             f": {', '.join(kinds)}" if kinds else ""
         )
-        ground = "" if self.background else ", transparent"
+        ground = "" if self.opaque else ", transparent"
         return f"<Scene {self.width} × {self.height}, {told}; {self.compositing}{ground}>"
 
     def _repr_mimebundle_(
@@ -376,10 +378,33 @@ class Scene:
         return sum(len(layer.shapes) for layer in self.layers)
 
     @property
+    def ground(self) -> tuple[float, float, float, float]:
+        """What is below all layers, premultiplied RGBA."""
+        red, green, blue, *given = self.background or (*BLACK, 0.0)
+        alpha = given[0] if given else 1.0
+        return red * alpha, green * alpha, blue * alpha, alpha
+
+    @property
+    def opaque(self) -> bool:
+        """Whether nothing shines through."""
+        return self.ground[3] == 1.0
+
+    @property
     def extent(self) -> tuple[float, float]:
         """Width and height of the canvas in scene units; the smaller is 1."""
         shortest = min(self.width, self.height)
         return self.width / shortest, self.height / shortest
+
+
+def _checked_ground(ground: Ground) -> Ground:
+    """A background, rounded. Raises SceneError."""
+    if ground is None:
+        return None
+    parameter = SHEER if isinstance(ground, (list, tuple)) and len(ground) == 4 else GROUND
+    red, green, blue, *alpha = numbers_of((parameter,), {parameter.name: ground})
+    if not alpha or alpha[0] == 1.0:
+        return red, green, blue
+    return (red, green, blue, alpha[0]) if alpha[0] else None
 
 
 def _refuse_signs(layer: Layer, path: str) -> None:

@@ -14,7 +14,7 @@ from ..lower.javascript import function_text
 from ..lower.shader import GLSL, definition, expression, used_functions
 from ..operation import VEC2, VEC4
 from ..paints import FLAT, PAINTS
-from ..scene import GROUND, MAX_JOINED, MAX_SHAPES, OPTIONAL, Scene
+from ..scene import GROUND, MAX_JOINED, MAX_SHAPES, OPTIONAL, SHEER, Scene
 from ..scene_file import FORMAT, VERSION
 from ..shapes import KINDS
 from ..templating import template
@@ -45,6 +45,7 @@ def component(scene: Scene, options: Options) -> Exported:
         look=json.dumps(list(map(_told, LOOK))),
         join=json.dumps(_told(JOIN)),
         ground=json.dumps(_told(GROUND)),
+        sheer=json.dumps(_told(SHEER)),
         patches=json.dumps([kind.name for kind in KINDS.values() if kind.patch is not None]),
         most_pixels=CANVAS_SIDE,
         most_shapes=MAX_SHAPES,

@@ -12,9 +12,9 @@ the same to every compiler.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
-from functools import cache, partial
+from functools import cache, cached_property, partial
 
 import numpy as np
 import torch
@@ -52,6 +52,7 @@ LIMIT = 0.95  # 8-bit levels: largest error of the picture; drawing adds less th
 CANVAS = (1920, 1080)  # pixels, for which the error is measured
 SAMPLE = 1 << 21  # shapes × pixels that are looked at where no kernels are worth compiling
 CELLS = 16  # along the longer side of the grid
+BLOCKS, MANY = 4, 256  # of cells along a side, where there are more layers than so many
 LEAST_BITS, MOST_BITS = 4, 24  # of a fraction; a float holds no more
 FEWER = 5  # bits that all layers begin without, when the fewest are looked for
 ROUNDS = 60
@@ -191,7 +192,8 @@ class _View:
         pixels = self.width * self.height
         self.whole = is_large(scene, self.width, self.height)
         step = 1 if self.whole else max(1, math.isqrt(scene.shape_count * pixels // SAMPLE))
-        x, y, self.pixel = reference.canvas(from_scene(scene), self.width, self.height)
+        self.tensors = from_scene(scene)
+        x, y, self.pixel = reference.canvas(self.tensors, self.width, self.height)
         self.x, self.y = (v.reshape(self.height, self.width)[::step, ::step].flatten() for v in (x, y))
 
     def picture(self, scene: Scene) -> Float32Array:
@@ -204,11 +206,19 @@ class _View:
             sample: Float32Array = reference.displayed(image).numpy()
             return sample
 
-    def coverages(self, scene: Scene, chosen: IntArray) -> Float32Array:
-        """Coverage of every layer at some of the pixels, [L, B]."""
-        covers, _ = reference.layers_at(from_scene(scene), self.x[chosen], self.y[chosen], self.pixel)
+    def coverages(self, layers: IntArray, chosen: IntArray) -> Float32Array:
+        """Coverage of some layers, in draw order, at some of the pixels, [L, B]."""
+        wanted = torch.from_numpy(layers)
+        picked = [(group, torch.isin(group.order, wanted)) for group in self.tensors.groups]
+        groups = [group.each(partial(_rows, which)) for group, which in picked if which.any()]
+        part = replace(self.tensors, groups=groups)
+        covers, _ = reference.layers_at(part, self.x[chosen], self.y[chosen], self.pixel)
         found: Float32Array = covers.numpy()
         return found
+
+
+def _rows(which: torch.Tensor, tensor: torch.Tensor) -> torch.Tensor:
+    return tensor[which]
 
 
 class _Packer:
@@ -222,14 +232,15 @@ class _Packer:
         self.grid, self.cells = _cell_boxes(scene, slack)
         self.finest = min(CANVAS)
         self._ends = cache(lambda cells, parameter: _ends_of(parameter, self.ranges, *self._box(cells)))
+        self._said: dict[int, tuple[int, Precision, Layer]] = {}  # of each layer the last that was asked for
 
     def quantised(self, precision: Precision, counts: Sequence[int]) -> Scene:
         """The scene as a shader will read it, with so many bits for the fractions of each layer."""
-        layers = [
-            self._layer(layer, cells, count, precision)[1]
-            for layer, cells, count in zip(self.scene.layers, self.cells, counts, strict=True)
-        ]
-        return replace(self.scene, layers=tuple(layers))
+        for index, count in enumerate(counts):
+            if self._said.get(index, ())[:2] != (count, precision):
+                said = self._layer(self.scene.layers[index], self.cells[index], count, precision)[1]
+                self._said[index] = (count, precision, said)
+        return replace(self.scene, layers=tuple(self._said[index][2] for index in range(len(counts))))
 
     def bit_counts(self, precision: Precision) -> list[int]:
         """Bits of a layer's fractions: as many as its edge is sharp against the size of its box."""
@@ -255,15 +266,33 @@ class _Packer:
         sizes = (cells[2] - cells[0] + 1, cells[3] - cells[1] + 1)
         return math.hypot(*sizes) / self.grid.per_unit / softness
 
+    @cached_property
+    def _all_steepness(self) -> Float64Array:
+        pairs = zip(self.scene.layers, self.cells, strict=True)
+        return np.array([self._steepness(*pair) for pair in pairs], np.float64)
+
     def to_blame(self, view: _View, chosen: IntArray, counts: IntArray) -> IntArray:
         """The layers whose coarse places can be why the picture is off at some pixels."""
-        steep = np.array([self._steepness(*pair) for pair in zip(self.scene.layers, self.cells, strict=True)])
-        heavy, guilty = (steep * 0.5**counts)[:, None], np.zeros(len(steep), bool)
-        for some in np.array_split(chosen, -(-len(chosen) * len(steep) // BLAMED)):
-            cover = np.abs(view.coverages(self.scene, some))
-            share = cover * (1.0 - cover) * heavy
-            guilty |= ((share >= BLAME * share.max(axis=0)) & (share > 0.0)).any(axis=1)
+        heavy, guilty = (self._all_steepness * 0.5**counts)[:, None], np.zeros(len(counts), bool)
+        for layers, pixels in self._near(view, chosen):
+            for some in np.array_split(pixels, -(-len(pixels) * len(layers) // BLAMED)):
+                cover = np.abs(view.coverages(layers, some))
+                share = cover * (1.0 - cover) * heavy[layers]
+                guilty[layers] |= ((share >= BLAME * share.max(axis=0)) & (share > 0.0)).any(axis=1)
         return np.nonzero(guilty)[0]
+
+    def _near(self, view: _View, chosen: IntArray) -> Iterator[tuple[IntArray, IntArray]]:
+        """Layers and pixels that may have to do with each other: each block of cells with what touches it."""
+        boxes = np.array(self.cells)
+        side = CELLS // BLOCKS if len(boxes) > MANY else CELLS
+        low, per_unit = self.grid.low, self.grid.per_unit
+        columns = np.floor((view.x[chosen].numpy() - low[0]) * per_unit).astype(int) // side
+        rows = np.floor((view.y[chosen].numpy() - low[1]) * per_unit).astype(int) // side
+        for column, row in {*zip(columns.tolist(), rows.tolist(), strict=True)}:
+            first, last = np.array([column, row]) * side, np.array([column, row]) * side + side - 1
+            layers = np.nonzero(((boxes[:, :2] <= last) & (boxes[:, 2:] >= first)).all(axis=1))[0]
+            if len(layers):
+                yield layers, chosen[(columns == column) & (rows == row)]
 
     def pack(self, precision: Precision, counts: Sequence[int], error: float) -> Packed:
         least = min(counts, default=1)

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import base64
+import hashlib
 import json
+import re
 from html import escape
 
 import numpy as np
@@ -21,6 +23,9 @@ from .shader import DATA_WIDTH, Shader, most_shapes, shader
 from .svg import svg
 
 FALLBACK = 1 << 20  # pixels
+POLICY = "what the page may do"  # where the template has it
+SCRIPT = re.compile(r'<script type="module">(.*?)</script>', re.DOTALL)
+STYLE = re.compile(r"<style>(.*?)</style>", re.DOTALL)
 LABELS = {"shadertoy": "Shadertoy", "glsl": "GLSL", "wgsl": "WGSL", "svg": "SVG"}
 
 
@@ -44,8 +49,20 @@ def html(scene: Scene, options: Options) -> Exported:
         texts=json.dumps({"fragment": made.text, **texts}, ensure_ascii=False).replace("<", "\\u003c"),
         data=base64.b64encode(_floats(made)).decode(),
         width=DATA_WIDTH,
+        policy=POLICY,
     )
-    return Exported(text)
+    return Exported(text.replace(POLICY, policy_of(text), 1))
+
+
+def policy_of(page: str) -> str:
+    """The Content-Security-Policy that a page works under: the script and the styles that it has, by their hashes."""
+    scripts, styles = (
+        [f"'sha256-{base64.b64encode(hashlib.sha256(part.encode()).digest()).decode()}'" for part in found]
+        for found in (SCRIPT.findall(page), STYLE.findall(page))
+    )
+    allowed = {"script-src": scripts, "style-src": styles, "img-src": ["data:"]}
+    told = (f"{name} {' '.join(dict.fromkeys(values))}" for name, values in allowed.items())
+    return "; ".join(["default-src 'none'", "base-uri 'none'", "form-action 'none'", *told])
 
 
 def _drawing(scene: Scene, options: Options) -> str:

@@ -30,7 +30,7 @@ def webp(scene: Scene, options: Options) -> Exported:
 def jpg(scene: Scene, options: Options) -> Exported:
     """As JPEG; transparent scenes lie on white. Raises Sdf2vecError for too many pixels."""
     pixels = _rendered(scene, options, "jpg", MAX_JPEG)
-    if scene.background is not None:
+    if scene.opaque:
         return Exported(encode(pixels, "JPEG", MARK))
     opaque = 1.0 - pixels[..., 3:] * (1.0 - pixels[..., :3])
     return Exported(encode(opaque, "JPEG", MARK), notes=("jpg: has no transparency: on white",))

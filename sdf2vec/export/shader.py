@@ -221,7 +221,7 @@ class _Job:
     @property
     def is_displayable(self) -> bool:
         """Whether the scene's colours need no clamping: in the smallest text that is left out."""
-        within = not COMPOSITING[self.scene.compositing].signed and self.scene.background is not None
+        within = not COMPOSITING[self.scene.compositing].signed and self.scene.opaque
         return self.choice.layout == "packed" and within
 
     def _frame(self) -> list[Expr]:
@@ -242,8 +242,7 @@ def _size(scene: Scene) -> Expr:
 
 
 def _background(scene: Scene) -> Expr:
-    values = (*scene.background, 1.0) if scene.background else (0.0,) * 4
-    return vec4(*(const(value) for value in values))
+    return vec4(*(const(value) for value in scene.ground))
 
 
 # --- readable: a line for every shape ----------------------------------------------------------------------

@@ -108,8 +108,8 @@ def adam_over(tensors: SceneTensors, crowding: float = CROWDING, frozen: tuple[s
     free = [(slot.parameter.unit, v) for group in tensors.groups for slot, v in group.values.items()]
     if not tensors.transparent:
         free.append((BACKGROUND, tensors.background))
-        if not COMPOSITING[tensors.compositing].hides:  # what is added to alpha is never seen
-            frozen = (*frozen, OPACITY.name)
+    if tensors.opaque and not COMPOSITING[tensors.compositing].hides:  # what is added to alpha is never seen
+        frozen = (*frozen, OPACITY.name)
     few = MANY / max(1, tensors.layer_count)
     crowd = few ** (crowding if few < 1 else CROWDING)
     canvas = math.sqrt(tensors.size[0] * tensors.size[1])

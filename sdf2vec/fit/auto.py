@@ -22,7 +22,7 @@ from ..render.tensors import SceneTensors, to_scene
 from ..scene import Scene
 from ..threads import threads_of_its_own
 from .backends import CPU, choose
-from .initialization import Layers, empty_groups
+from .initialization import Layers, background_of, empty_groups
 from .joining import Search
 from .loop import Callback, Progress, Stopped, fit_picture, scaled, view_of
 from .matching_pursuit import Painted, find_discs
@@ -172,6 +172,9 @@ class Drawing:
         except Stopped:
             self.stopped = True
         self.error = error_of(self.scene, self.sizes.last)
+        return self._made()
+
+    def _made(self) -> Scene:
         return to_scene(self.scene, self.picture.width, self.picture.height)
 
     def _finish(self) -> None:
@@ -198,14 +201,15 @@ class Drawing:
 
     def _say(self, phase: str, loss: float) -> None:
         count = self.scene.layer_count
-        if self.callback(Progress(phase, count, max(count + 1, self.settings.most), loss)):
+        steps = max(count + 1, self.settings.most)
+        if self.callback(Progress(phase, count, steps, loss, self._made)):
             raise Stopped
 
 
 def ground_of(target: torch.Tensor) -> torch.Tensor:
-    """The most common colour of a picture [C, H, W] where it dominates, else the mean; nothing where it has alpha."""
+    """The most common colour of a picture [C, H, W] where it dominates, else the mean."""
     if len(target) == 4:
-        return torch.zeros(4)
+        return background_of(target)
     colors = target.flatten(1).T
     common = common_color(colors, torch.ones(len(colors)))
     near = (colors - common).abs().amax(1) < LEVELS

@@ -26,7 +26,8 @@ def project(tensors: SceneTensors, pixel: float, falloff: tuple[float, float] = 
     for group in tensors.groups:
         for slot, values in group.values.items():
             slot.parameter.unit.project(values, slot.parameter.positive, room)
-    BACKGROUND.project(tensors.background[:3], False, room)
+    BACKGROUND.project(tensors.background, False, room)
+    tensors.background.clamp_(max=tensors.background[3].clone())  # premultiplied
 
 
 def enforce_min_thickness(tensors: SceneTensors, least: float) -> None:

@@ -23,10 +23,10 @@ OPACITY = 0.9
 def over_of(scene: Scene) -> tuple[Scene, float]:
     """A scene under `over` with as many shapes that looks like an additive one, and how near it is in dB."""
     if not scene.layers:
-        return replace(scene, background=_displayed(scene.background), compositing="over"), float("inf")
+        return replace(scene, compositing="over"), float("inf")
     width, height = fitted_size(scene.width, scene.height, min(LARGEST, scene.width, scene.height))
     wanted = draw(scene, width, height)
-    channels = 4 if scene.background is None else 3
+    channels = 3 if scene.opaque else 4
     pixels = wanted.permute(1, 2, 0).numpy()
     picture = Picture(unpremultiply(pixels) if channels == 4 else np.ascontiguousarray(pixels[..., :3]))
     kinds = list(dict.fromkeys(layer.shapes[0].kind for layer in scene.layers))
@@ -46,17 +46,10 @@ def _painted(scene: Scene) -> Scene:
     colors = light.clamp(0.0, 1.0).tolist()
     order = (-covers.sum(1)).argsort(stable=True).tolist()
     layers = tuple(_laid(scene.layers[i], colors[i]) for i in order)
-    return Scene(scene.width, scene.height, layers, _displayed(scene.background))
+    return Scene(scene.width, scene.height, layers, scene.background)
 
 
 def _laid(layer: Layer, color: list[float]) -> Layer:
     red, green, blue = color
     shapes = tuple(Shape(shape.kind, shape.parameters, (red, green, blue)) for shape in layer.shapes)
     return Layer(shapes, layer.falloff, OPACITY, layer.joints)
-
-
-def _displayed(color: tuple[float, float, float] | None) -> tuple[float, float, float] | None:
-    if color is None:
-        return None
-    red, green, blue = (min(max(channel, 0.0), 1.0) for channel in color)
-    return red, green, blue

@@ -20,6 +20,8 @@ CANDIDATES = 8  # positions tried for each shape; the one farthest from the othe
 START_FALLOFF = 0.4  # of a shape's size
 LARGEST_SIZE = 0.35  # size of a shape, for a canvas of area 1
 START_OPACITY = 0.8  # of an opaque picture, where colours are not signed
+HOLES = 0.02  # share of a picture that may have less alpha than its ground
+FAINTEST_GROUND = 1 / 255  # of alpha
 START_SMOOTHNESS = 0.25  # of a smooth union, of the size of its layer
 
 
@@ -149,10 +151,15 @@ def _spread(
 
 
 def background_of(target: torch.Tensor) -> torch.Tensor:
-    """The mean colour of an opaque picture, nothing for one with alpha; premultiplied RGBA."""
-    if len(target) == 4:
-        return torch.zeros(4)
-    return torch.cat([target.mean(dim=(1, 2)), torch.ones(1)])
+    """The mean colour of a picture, with the alpha that nearly all of it has; premultiplied RGBA.
+
+    Nothing where the picture is transparent: what is laid over a ground can't take its alpha away.
+    """
+    mean = target.mean(dim=(1, 2))
+    if len(target) == 3:
+        return torch.cat([mean, torch.ones(1)])
+    alpha = target[3].flatten().sort().values[int(HOLES * target[3].numel())]
+    return torch.zeros(4) if alpha < FAINTEST_GROUND else mean * (alpha / mean[3])
 
 
 def colors_at(target: torch.Tensor, centers: torch.Tensor, size: tuple[float, float]) -> torch.Tensor:

@@ -91,7 +91,7 @@ def _wrong(scene: SceneTensors, view: View) -> torch.Tensor:
 
 def _grounded(scene: SceneTensors, view: View) -> SceneTensors:
     """The scene on the median colour of the picture where the background is seen, if that is nearer to it."""
-    if scene.transparent:
+    if not scene.opaque:
         return scene
     light, dark = (
         composite_points(replace(scene, background=torch.full((4,), end)), *points_of(scene, view))

@@ -6,7 +6,7 @@ import math
 from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import dataclass, replace
-from functools import partial
+from functools import cached_property, partial
 
 import numpy as np
 import torch
@@ -20,13 +20,14 @@ from ..scene import Scene
 from ..threads import threads_of_its_own
 from .adam import Adam, adam_over
 from .backends import Backend, choose
+from .best import Best, faded, mean_color, nearest_of_its_own
 from .constraints import enforce_min_thickness, project, too_small
 from .growth import densify, exchange, importance, prune, relocate
 from .initialization import Layers, background_of, empty_groups, place
 from .joining import RESOLUTIONS as JOIN_RESOLUTIONS
 from .joining import Search, join
 from .losses import Objective, objective
-from .presets import CROWDING, Phase, Start
+from .presets import CROWDING, MSE, Phase, Start
 from .settings import Settings, preset_of
 from .surroundings import View
 from .weights import weights_for
@@ -45,12 +46,13 @@ SAME_SHAPE = 0.01  # scene units by which a start scene's canvas may differ
 
 @dataclass(frozen=True)
 class Progress:
-    """Where a fit stands, and on which device; `step` counts over all phases."""
+    """Where a fit stands, and on which device; `step` counts over all phases. `scene()` is the scene as it is now."""
 
     phase: str
     step: int
     steps: int
     loss: float
+    scene: Callable[[], Scene]
     device: str = "cpu"
 
 
@@ -70,7 +72,7 @@ def fit_picture(picture: Picture, settings: Settings, callback: Callback = lambd
     with threads_of_its_own():
         fit = Fit(picture, settings, callback)
         fit.run()
-    return to_scene(fit.tensors, picture.width, picture.height)
+    return fit.scene()
 
 
 @dataclass(frozen=True)
@@ -97,7 +99,8 @@ class Fit:
         self.backend: Backend = choose(settings.device)
         self.generator = torch.Generator().manual_seed(settings.seed)
         self.pixels = picture.premultiplied
-        self.pixel = 1.0 / min(picture.width, picture.height)
+        self.sides = (picture.width, picture.height)
+        self.pixel = 1.0 / min(self.sides)
         self.size = (picture.width * self.pixel, picture.height * self.pixel)
         self.wanted = settings.most // settings.union  # layers
         self.done, self.steps, self.stopped = 0, self._count_steps(), False
@@ -112,22 +115,28 @@ class Fit:
         phases = self.preset.phases
         return phases if self.settings.start is None or len(phases) == 1 else phases[1:]
 
+    def scene(self) -> Scene:
+        """The scene as it is now."""
+        return to_scene(self.tensors, *self.sides)
+
     def run(self) -> None:
         """The whole fit, in place. Also when it is stopped, no shape stays too thin and colours are restricted."""
         with suppress(Stopped):
             self._train_all()
         if self.settings.palette or self.settings.colors:
-            stage = self._stage(self.phases[-1])
+            stage = self.finest
             self._restrict_colors(stage)
             if not self.stopped:
                 with suppress(Stopped):
                     self._refit(stage)
         enforce_min_thickness(self.tensors, self.pixel)
+        if not self.stopped:
+            self._fade()
 
     def _train_all(self) -> None:
         """All phases and trials."""
         for phase in self.phases:
-            stage = self._stage(phase)
+            stage = self.finest if phase is self.phases[-1] else self._stage(phase)
             for batch in range(phase.batches):
                 if phase.batches == 1:
                     self._train(stage)
@@ -138,6 +147,11 @@ class Fit:
             self._try(stage)
         if self.settings.cuts:
             self._join(stage)
+
+    @cached_property
+    def finest(self) -> Stage:
+        """The last phase."""
+        return self._stage(self.phases[-1])
 
     def _adam(self, frozen: tuple[str, ...] = ()) -> Adam:
         losses = {name for phase in self.phases for name, _ in phase.loss}
@@ -157,7 +171,7 @@ class Fit:
             return place(target, self.size, layers, count, self.preset.start, self.generator)
         _check_start(settings.start, self.size)
         tensors = replace(from_scene(settings.start), size=self.size)
-        if tensors.transparent != (len(target) == 4):
+        if tensors.opaque == (len(target) == 4):
             tensors.background = background_of(target)
         present = {group.structure for group in tensors.groups}
         tensors.groups += [group for group in empty_groups(layers) if group.structure not in present]
@@ -206,7 +220,7 @@ class Fit:
 
     def _announce_compiling(self) -> None:
         if not self.backend.is_compiled(self.tensors, self.pixels.shape[2]):
-            self.callback(Progress("compiling kernels (once)", 0, self.steps, math.nan))
+            self.callback(Progress("compiling kernels (once)", 0, self.steps, math.nan, self.scene))
 
     def _stage(self, phase: Phase) -> Stage:
         view, device = view_of(self.pixels, self.settings, self._resolution(phase)), self.backend.device
@@ -222,23 +236,42 @@ class Fit:
         return self.backend.composite(tensors, width, height, channels)
 
     def _train(self, stage: Stage, moves: Callable[[Group], torch.Tensor] | None = None) -> None:
-        """The steps of a phase; `moves` tells which layers of a group are trained, all without it."""
+        """The steps of a phase; `moves` tells which layers of a group are trained, all without it.
+
+        Where the shapes stay the same, it ends with the best state seen.
+        """
+        phase = stage.phase
+        best = Best(self.tensors) if phase.growth is None and phase.relocation is None else None
+        try:
+            self._take_steps(stage, moves, best)
+        finally:  # also when stopped
+            if best:
+                best.restore(self._loss(stage))
+
+    def _take_steps(
+        self, stage: Stage, moves: Callable[[Group], torch.Tensor] | None, best: Best | None
+    ) -> None:
         phase = stage.phase
         for step, rate in enumerate(phase.rates()):
             if phase.growth is not None and self.settings.start is None:
                 self._grow(stage, phase.growth.count(step, phase.steps, self.wanted))
             if phase.relocation is not None and phase.relocation.is_due(step, phase.steps):
                 self._relocate(stage, phase.relocation.share)
-            loss = self._step(stage, rate, moves)
+            loss = self._step(stage, rate, moves, best)
             self.done += 1
             self._report(phase, loss)
 
-    def _step(self, stage: Stage, rate: float, moves: Callable[[Group], torch.Tensor] | None) -> float:
+    def _step(
+        self,
+        stage: Stage,
+        rate: float,
+        moves: Callable[[Group], torch.Tensor] | None,
+        best: Best | None,
+    ) -> float:
         self.optimizer.zero_grad()
-        value = stage.measure(self._draw(self.tensors, stage.target))
-        if self.preset.least_area > 0:
-            least_area = self.preset.least_area * self.size[0] * self.size[1]
-            value = value + AREA_WEIGHT * too_small(self.tensors, least_area)
+        value = self._value(stage)
+        if best:
+            best.see(float(value.detach()))
         value.backward()
         if moves is not None:
             _freeze(self.tensors, moves)
@@ -247,6 +280,34 @@ class Fit:
         if self.done % THICKEN_EVERY == 0:
             enforce_min_thickness(self.tensors, self.pixel)
         return float(value.detach())
+
+    def _value(self, stage: Stage) -> torch.Tensor:
+        """What is descended."""
+        value = stage.measure(self._draw(self.tensors, stage.target))
+        if self.preset.least_area > 0:
+            least_area = self.preset.least_area * self.size[0] * self.size[1]
+            value = value + AREA_WEIGHT * too_small(self.tensors, least_area)
+        return value
+
+    @torch.no_grad()
+    def _loss(self, stage: Stage) -> float:
+        return float(self._value(stage))
+
+    @torch.no_grad()
+    def _fade(self) -> None:
+        """What is no worse than a ground alone: by the loss that was asked for, or by PSNR and the preset's."""
+        stage = self.finest
+        squared = objective(MSE, stage.target, stage.weights)
+        measures = (stage.measure,) if self.settings.loss else (squared, stage.measure)
+
+        def wrong(scene: SceneTensors) -> tuple[float, ...]:
+            image = self._draw(scene, stage.target)
+            return tuple(float(measure(image)) for measure in measures)
+
+        ground = mean_color(stage.target, stage.weights)
+        if self.settings.palette or self.settings.colors:
+            ground = nearest_of_its_own(self.tensors, ground)
+        self.tensors = faded(self.tensors, ground, wrong)
 
     def _try(self, stage: Stage) -> None:
         """Starts a few layers anew, anywhere, trains them alone, and takes that back unless the loss falls."""
@@ -290,7 +351,7 @@ class Fit:
         self.done = last
 
     def _report(self, phase: Phase, loss: float) -> None:
-        if self.callback(Progress(phase.name, self.done, self.steps, loss, self.backend.device)):
+        if self.callback(Progress(phase.name, self.done, self.steps, loss, self.scene, self.backend.device)):
             self.stopped = True
             raise Stopped
 

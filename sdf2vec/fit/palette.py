@@ -12,6 +12,7 @@ from skimage.color import lab2rgb, rgb2lab
 from ..arrays import Float64Array
 from ..render.tensors import SceneTensors
 from ..scene import Color
+from .initialization import straight
 
 SAMPLES = 4096  # colours drawn in proportion to what they cover
 ROUNDS = 50  # of k-means
@@ -51,7 +52,8 @@ def snap(tensors: SceneTensors, palette: Sequence[Color]) -> None:
         for colors in group.colors:
             colors.copy_(_nearest(colors.cpu(), choices).to(colors.device))
     if not tensors.transparent:
-        tensors.background[:3] = _nearest(tensors.background[None, :3].cpu(), choices)[0]
+        ground = straight(tensors.background[None])[:, :3].cpu()
+        tensors.background[:3] = _nearest(ground, choices)[0] * tensors.background[3]
 
 
 def _nearest(colors: torch.Tensor, choices: torch.Tensor) -> torch.Tensor:
@@ -64,7 +66,7 @@ def _nearest(colors: torch.Tensor, choices: torch.Tensor) -> torch.Tensor:
 def _colors(tensors: SceneTensors) -> torch.Tensor:
     """All colours of a scene, [M, 3]; the background's last, unless it is transparent."""
     colors = [own.detach().cpu() for group in tensors.groups for own in group.colors]
-    ground = [] if tensors.transparent else [tensors.background.detach()[None, :3].cpu()]
+    ground = [] if tensors.transparent else [straight(tensors.background.detach()[None]).cpu()[:, :3]]
     return torch.cat([*colors, *ground]).clamp(0.0, 1.0)
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Container, Sequence
 
 import torch
 
@@ -27,19 +27,30 @@ def compile_torch(outputs: Sequence[Expr], inputs: Sequence[Expr]) -> Callable[.
 
 
 def source(scalars: Sequence[Expr], inputs: Sequence[Expr]) -> str:
-    """The text of the Python function: one assignment per node, in order."""
+    """The text of the Python function: one assignment per node, in order; each value goes when it is no longer used."""
     names = {variable: str(variable.payload) for variable in inputs}
-    like = names[inputs[0]]
+    like, nodes = names[inputs[0]], list(walk(scalars))
+    last = {arg: node for node in nodes for arg in node.args}
+    kept = set(scalars)
     lines = [f"def lowered({', '.join(names.values())}):"]
-    for node in walk(scalars):
+    for node in nodes:
         if node.op == "const":
             names[node] = repr(constant(node))
         elif node.op != "var":
-            name = f"t{len(lines)}"
-            lines.append(f"    {name} = {_spell(node, names, like)}")
-            names[node] = name
+            names[node] = f"t{len(lines)}"
+            lines.append(f"    {names[node]} = {_spell(node, names, like)}{_freed(node, last, names, kept)}")
     results = (f"{like}.new_tensor({names[s]})" if s.op == "const" else names[s] for s in scalars)
     return "\n".join([*lines, f"    return ({', '.join(results)},)"]) + "\n"
+
+
+def _freed(node: Expr, last: dict[Expr, Expr], names: dict[Expr, str], kept: Container[Expr]) -> str:
+    """Forgets what was used for the last time: a union of many shapes would hold thousands of arrays."""
+    spent = [
+        a
+        for a in dict.fromkeys(node.args)
+        if last[a] is node and a.op not in ("const", "var") and a not in kept
+    ]
+    return f"; del {', '.join(names[a] for a in spent)}" if spent else ""
 
 
 def _spell(node: Expr, names: dict[Expr, str], like: str) -> str:

@@ -28,7 +28,7 @@ def draw(scene: Scene, width: int | None = None, height: int | None = None) -> t
 def pixels_of(scene: Scene, width: int | None = None, height: int | None = None) -> Float32Array:
     """The scene as an array [height, width, 3], or [.., 4] with straight alpha when it is transparent; 0..1."""
     pixels: Float32Array = draw(scene, width, height).permute(1, 2, 0).numpy()
-    return np.ascontiguousarray(pixels[..., :3]) if scene.background else unpremultiply(pixels)
+    return np.ascontiguousarray(pixels[..., :3]) if scene.opaque else unpremultiply(pixels)
 
 
 def is_large(scene: Scene, width: int, height: int) -> bool:
@@ -51,7 +51,7 @@ def _drawn_fused(tensors: SceneTensors, width: int, height: int) -> torch.Tensor
 
 def _is_opaque(tensors: SceneTensors) -> bool:
     """Over an opaque background the picture is opaque: the kernels of a fit, of 3 channels, are enough."""
-    return not tensors.transparent and tensors.compositing == "over"
+    return tensors.opaque and tensors.compositing == "over"
 
 
 def _composite(tensors: SceneTensors, width: int, height: int) -> torch.Tensor:

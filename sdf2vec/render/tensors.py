@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import torch
 
 from ..layer import Slot, Structure, slots
-from ..scene import Color, Layer, Scene
+from ..scene import Ground, Layer, Scene
 from ..shapes import KINDS
 from ..units import COLOR
 
@@ -90,7 +90,13 @@ class SceneTensors:
 
     @property
     def transparent(self) -> bool:
+        """Whether there is no ground."""
         return float(self.background[3].detach()) == 0.0
+
+    @property
+    def opaque(self) -> bool:
+        """Whether the ground is."""
+        return float(self.background[3].detach()) == 1.0
 
 
 def on_device(tensors: SceneTensors, device: str) -> SceneTensors:
@@ -106,10 +112,9 @@ def from_scene(scene: Scene, dtype: torch.dtype = torch.float32, device: str = "
         members[layer.structure].append(index)
     places = {kind: place for place, kind in enumerate(KINDS)}
     groups = sorted(members.items(), key=lambda item: (places[item[0][0].kind], len(item[0]), item[0]))
-    background = (*scene.background, 1.0) if scene.background is not None else (0.0,) * 4
     return SceneTensors(
         [_group(scene, structure, order, dtype, device) for structure, order in groups],
-        torch.tensor(background, dtype=dtype, device=device),
+        torch.tensor(scene.ground, dtype=dtype, device=device),
         scene.compositing,
         scene.extent,
     )
@@ -127,14 +132,16 @@ def to_scene(tensors: SceneTensors, width: int, height: int) -> Scene:
     layers: dict[int, Layer] = {}
     for group in tensors.groups:
         layers |= zip(group.order.tolist(), _layers(group), strict=True)
-    background = None if tensors.transparent else _color(tensors.background[:3].tolist())
-    return Scene(width, height, tuple(layers[i] for i in sorted(layers)), background, tensors.compositing)
+    ordered = tuple(layers[i] for i in sorted(layers))
+    return Scene(width, height, ordered, _straight(tensors.background.tolist()), tensors.compositing)
 
 
 def _layers(group: Group) -> Iterator[Layer]:
     return (Layer.from_numbers(group.structure, row) for row in group.rows().tolist())
 
 
-def _color(values: list[float]) -> Color:
-    red, green, blue = values
-    return red, green, blue
+def _straight(ground: list[float]) -> Ground:
+    """The background of a scene from premultiplied RGBA."""
+    *light, alpha = ground
+    red, green, blue = (min(value / alpha, 1.0) if alpha else 0.0 for value in light)
+    return red, green, blue, alpha

@@ -5,9 +5,14 @@ import math
 import re
 import sys
 
+from sdf2vec import Scene
 from sdf2vec.fit.loop import Progress
 from sdf2vec.progress import telling
 from sdf2vec.running import Running
+
+
+def scene():
+    return Scene(8, 8, ())
 
 
 def terminal(monkeypatch):
@@ -24,9 +29,9 @@ def test_the_bar_names_every_phase_and_never_a_number_that_is_none(monkeypatch, 
     stream = terminal(monkeypatch)
     with telling(Running()) as teller:
         with teller.phase("fit"):
-            teller.step(Progress("compiling kernels (once)", 0, 90, math.nan))
+            teller.step(Progress("compiling kernels (once)", 0, 90, math.nan, scene))
             teller.bar.refresh()
-            teller.step(Progress("coarse", 7, 90, 0.25))
+            teller.step(Progress("coarse", 7, 90, 0.25, scene))
             teller.bar.refresh()
         for name in ("export svg", "check svg"):
             with teller.phase(name):
@@ -45,5 +50,5 @@ def test_a_quiet_run_has_no_bar(monkeypatch, capsys):
     stream = terminal(monkeypatch)
     with telling(Running(quiet=True)) as teller, teller.phase("fit"):
         teller.say("nothing")
-        teller.step(Progress("coarse", 7, 90, 0.25))
+        teller.step(Progress("coarse", 7, 90, 0.25, scene))
     assert stream.getvalue() + capsys.readouterr().out == ""

@@ -1,6 +1,7 @@
 """The web component in a real browser, and the JavaScript that its formulas are lowered to."""
 
 import json
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -58,9 +59,10 @@ def test_it_shows_a_scene_file_and_follows_its_size(compositing, opened):
         assert_shows(page, scene, 120, 80)
 
 
-@pytest.mark.parametrize("layers", [0, 1])
-def test_hardly_any_shapes_on_no_ground(layers, opened):
-    scene = random_scene(("circle",), layers=layers, seed=7, width=50, height=50, transparent=True)
+@pytest.mark.parametrize(("layers", "ground"), [(0, None), (1, (0.8, 0.3, 0.1, 0.4))])
+def test_hardly_any_shapes_on_no_ground_and_on_a_faint_one(layers, ground, opened):
+    drawn = random_scene(("circle",), layers=layers, seed=7, width=50, height=50)
+    scene = replace(drawn, background=ground)
     with opened(dumps(scene), 150, 150) as page:
         assert_shows(page, scene, 150, 150)
 
@@ -192,6 +194,8 @@ HOSTILE = [
     (changed(["background"], ["0.0); discard; //", 0, 0]), "background"),
     (changed(["background"], "red"), "background"),
     (changed(["background"], [0, 0, 2]), "background"),
+    (changed(["background"], [0, 0, 0, 2]), "background"),
+    (changed(["background"], [0, 0, 0, 0, 0]), "background"),
     (changed(["width"], 1e9), "width"),
     (changed(["width"], "50"), "width"),
     (changed(["height"], 0), "height"),

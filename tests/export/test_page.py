@@ -31,6 +31,12 @@ def page_of(scene, **options):
     return text
 
 
+def without_webgl(text):
+    """By a script of its own, which the page's policy would forbid."""
+    text = re.sub(r'<meta http-equiv="Content-Security-Policy"[^>]*>', "", text)
+    return text.replace("</head>", NO_WEBGL + "</head>")
+
+
 @pytest.fixture
 def opened(require_engine):
     require_engine("chromium")
@@ -75,7 +81,7 @@ def test_page_holds_all_that_it_needs(opened):
 
 
 def test_without_webgl_the_drawing_is_shown(opened):
-    text = page_of(SCENE).replace("</head>", NO_WEBGL + "</head>")
+    text = without_webgl(page_of(SCENE))
     with opened(text, 400, 400) as page:
         assert page.locator(".fallback svg").is_visible()
         assert not page.locator("canvas").is_visible()
@@ -88,7 +94,7 @@ def test_a_scene_without_a_drawing_falls_back_to_pixels(opened, monkeypatch):
         raise sdf2vec.Sdf2vecError("no")
 
     monkeypatch.setattr(page_module, "svg", refuse)
-    text = page_of(SCENE).replace("</head>", NO_WEBGL + "</head>")
+    text = without_webgl(page_of(SCENE))
     assert "Copy SVG" not in text
     with opened(text, 300, 300) as page:
         assert page.evaluate("document.querySelector('.fallback img').naturalWidth") == 120

@@ -60,5 +60,5 @@ def error(scene: Scene, pic: Picture) -> float:
 def colors_of(scene: Scene) -> set[tuple[float, ...]]:
     """All colours, in 1/1000."""
     colors = [shape.color for layer in scene.layers for shape in layer.shapes]
-    colors += [scene.background] if scene.background else []
+    colors += [scene.background[:3]] if scene.background else []
     return {tuple(round(value, 3) for value in color) for color in colors}

@@ -17,6 +17,8 @@ from sdf2vec.export.options import GLSL_VERSIONS, LAYOUTS, SVG_PROFILES, Options
 from sdf2vec.fit.settings import Settings, settings_of
 from sdf2vec.image import load
 from tests.fuzz import domain
+from tests.fuzz.fits import attack_fits
+from tests.fuzz.kills import attack_kills
 
 TARGETS = tuple(name for name in EXPORTERS if name != "pdf")  # whose drawing is that of the portable SVG
 ODD = [
@@ -145,6 +147,8 @@ ATTACKS = {
     "arrays": attack_arrays,
     "scenes": attack_scenes,
     "options": attack_options,
+    "fits": attack_fits,
+    "kills": attack_kills,
 }
 
 

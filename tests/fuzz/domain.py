@@ -65,6 +65,6 @@ def scene(seed, layers=6, longest=5, compositing=None):
     r = random.Random(seed)
     compositing = compositing or r.choice(list(COMPOSITING))
     made = tuple(layer(r, compositing, longest) for _ in range(r.randint(0, layers)))
-    ground = None if r.random() < 0.3 else (r.random(), r.random(), 1.0)
+    ground = r.choice([None, (r.random(), r.random(), 1.0), (r.random(), r.random(), 0.0, r.random())])
     width, height = (side(r), side(r)) if r.random() < 0.3 else (60, 40)
     return Scene(width, height, made, ground, compositing)

@@ -8,7 +8,14 @@ import sdf2vec
 from tests.fuzz import domain
 from tests.fuzz.attacks import ATTACKS, attempt
 
-SHARES = {"pictures": (2000, 4.0), "arrays": (500, 2.0), "scenes": (60, 10.0), "options": (1000, 2.0)}
+SHARES = {
+    "pictures": (2000, 4.0),
+    "arrays": (500, 2.0),
+    "scenes": (60, 10.0),
+    "options": (1000, 2.0),
+    "fits": (20, 2.0),
+    "kills": (6, 3.0),
+}
 """How many seeds, and after how many seconds no further one is begun."""
 
 FAILED = [(0, "svg"), (3, "svg")]

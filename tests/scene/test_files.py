@@ -73,7 +73,8 @@ def layers(lowest):
 def scenes_of(compositing):
     side = st.integers(1, 65536)
     drawn = st.lists(layers(COMPOSITING[compositing].lowest), max_size=5).map(tuple)
-    background = st.none() | st.tuples(*[numbers(0.0, 1.0)] * 3)
+    channel = numbers(0.0, 1.0)
+    background = st.none() | st.tuples(*[channel] * 3) | st.tuples(*[channel] * 4)
     return st.builds(Scene, side, side, drawn, background, st.just(compositing))
 
 

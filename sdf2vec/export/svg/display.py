@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 from ...outlines import Outline, Point
-from ...scene import Color
+from ...scene import Color, Ground
 
 Segment = tuple[Point, ...]  # a Bézier curve without its start: one point is a line, three are a cubic
 
@@ -107,7 +107,7 @@ class Drawing:
     height: float
     scale: float
     digits: int
-    ground: Color | None
+    ground: Ground
     items: tuple[Item, ...]
 
 

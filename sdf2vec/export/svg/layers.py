@@ -48,7 +48,7 @@ def drawing(scene: Scene, plan: Plan, detail: Detail) -> Drawing:
     off = {index: blurred.difference for index, blurred in plan.blurred.items()}
     cut = [index for index, layer in enumerate(scene.layers) if plan.is_rounded_down(index, layer)]
     scene = refitted(scene, plan.samples, off, cut, *((grain.colors, grain.opacities) if grain else ()))
-    painter = Painter(plan, detail, TRANSPARENT_LIFT if scene.background is None else 0.0)
+    painter = Painter(plan, detail, 0.0 if scene.opaque else TRANSPARENT_LIFT)
     drawn = [painter.draw(layer, index) for index, layer in enumerate(scene.layers)]
     items = tuple(item for item in drawn if item is not None)
     return Drawing(canvas.width, canvas.height, canvas.pixels, canvas.digits, scene.background, items)

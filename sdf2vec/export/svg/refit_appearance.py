@@ -82,7 +82,7 @@ def refitted(
 
 @dataclass(frozen=True)
 class Stack:
-    """Layers on a small canvas: coverage [N, P] as drawn, colours [N, 3, P or 1], opacities [N]; a ground or none.
+    """Layers on a small canvas: coverage [N, P] as drawn, colours [N, 3, P or 1], opacities [N]; on a ground.
 
     `first`: colours and opacities before anything was solved. `plain` [N]: whether a layer has a single colour.
     """
@@ -90,7 +90,7 @@ class Stack:
     covers: Float32Array
     colors: Float64Array
     opacities: Float64Array
-    ground: Float64Array | None  # [3]
+    ground: Float64Array  # [4] premultiplied
     plain: BoolArray
     first: tuple[Float64Array, Float64Array]
 
@@ -110,13 +110,17 @@ class Stack:
         return hidden, hidden[0] * (1.0 - alphas[0])
 
     def picture(self) -> Float64Array:
-        """Premultiplied colour and, without a ground, alpha [3 or 4, P]."""
+        """Premultiplied colour and, without an opaque ground, alpha [3 or 4, P]."""
         hidden, rest = self.shown()
         weights = hidden * self.alphas
         color = sum(np.multiply(weight, color) for weight, color in zip(weights, self.colors, strict=True))
-        if self.ground is not None:
-            return np.asarray(color + self.ground[:, None] * rest, np.float64)
-        return np.concatenate([color, 1.0 - rest[None]]).astype(np.float64)
+        drawn = np.concatenate([color, 1.0 - rest[None]]) + self.ground[:, None] * rest
+        return drawn[: self.channels].astype(np.float64)
+
+    @property
+    def channels(self) -> int:
+        """Of the picture."""
+        return 3 if self.ground[3] == 1.0 else 4
 
     def error(self, wanted: Float64Array) -> float:
         """Mean squared difference from a picture."""
@@ -169,11 +173,10 @@ class Stack:
 
     def _slopes(self) -> Iterator[Float64Array]:
         """For each layer the change of the picture [3 or 4, P] with its opacity."""
-        channels = 4 if self.ground is None else 3
         alphas = self.alphas
         steps = steps_over(alphas, self.colors, self.ground)
         for step, share in zip(steps, self.covers * showing(alphas), strict=True):
-            yield (step * share)[:channels]
+            yield (step * share)[: self.channels]
 
     def _color_equations(self, wanted: Float64Array) -> tuple[Float64Array, Float64Array]:
         """Gram matrix and right side of the least squares for the single colours."""
@@ -192,7 +195,7 @@ def _stack(
 ) -> tuple[Stack, Float64Array]:
     """The scene's layers as they are drawn, and its render, on a small canvas."""
     covers, colors, width, height = samples
-    ground = None if scene.background is None else np.array(scene.background)
+    ground = np.array(scene.ground)
     opacities = np.array([layer.opacity for layer in scene.layers])
     plain = np.array([len(set(layer.colors)) == 1 for layer in scene.layers])
     exact = Stack(covers.astype(np.float32), colors, opacities, ground, plain, (colors, opacities))

@@ -43,11 +43,10 @@ def contrasts(scene: Scene, samples: LayerSamples) -> Float64Array:
     opacity = np.array([layer.opacity for layer in scene.layers])[:, None]
     alphas = covers * opacity
     through = showing(alphas) * opacity
-    ground = None if scene.background is None else np.array(scene.background)
     found = np.empty(len(covers))
-    for i, step in enumerate(steps_over(alphas, colors, ground)):
+    for i, step in enumerate(steps_over(alphas, colors, np.array(scene.ground))):
         change = np.square(step)
-        shown = change[:3].mean(axis=0) + (change[3] if ground is None else 0.0)
+        shown = change[:3].mean(axis=0) + (0.0 if scene.opaque else change[3])
         found[i] = np.sum(soft[i] * shown * np.square(through[i])) / soft[i].sum()
     return found
 
@@ -62,16 +61,12 @@ def showing(alphas: NDArray[Float]) -> NDArray[Float]:
     return through
 
 
-def steps_over(
-    alphas: NDArray[Float], colors: Float64Array, ground: Float64Array | None
-) -> Iterator[Float64Array]:
+def steps_over(alphas: NDArray[Float], colors: Float64Array, ground: Float64Array) -> Iterator[Float64Array]:
     """For each layer, lowest first, its opaque colour minus what lies below it, premultiplied RGBA [4, P].
 
-    `alphas` [N, P], `colors` [N, 3, P or 1], `ground` [3] or None for a transparent one.
+    `alphas` [N, P], `colors` [N, 3, P or 1], `ground` [4] premultiplied.
     """
-    below = np.zeros((4, alphas.shape[1]))
-    if ground is not None:
-        below += np.append(ground, 1.0)[:, None]
+    below = np.repeat(ground[:, None], alphas.shape[1], axis=1)
     for alpha, color in zip(alphas, colors, strict=True):
         own = np.concatenate([np.broadcast_to(color, (3, len(alpha))), np.ones((1, len(alpha)))])
         yield (step := own - below)

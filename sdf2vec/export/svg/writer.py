@@ -89,7 +89,7 @@ class _Writer:
         """The document without its title, ids with PREFIX."""
         drawing, body = self.drawing, self.svg
         if drawing.ground is not None:
-            body.add(body.rect((None, None), ("100%", "100%"), fill=color_text(drawing.ground)))
+            body.add(body.rect((None, None), ("100%", "100%"), **_ground_fill(drawing.ground)))
         items = [self.item(item) for item in drawing.items]
         if self.style.compact and items:
             body = self.svg.add(self.svg.g(**STROKES))
@@ -349,6 +349,12 @@ def number(value: float, digits: int) -> str:
     if text in ("-0", ""):
         return "0"
     return text.replace("0.", ".", 1) if text.startswith(("0.", "-0.")) else text
+
+
+def _ground_fill(ground: tuple[float, ...]) -> dict[str, str]:
+    red, green, blue, *alpha = ground
+    sheer = {"fill_opacity": opacity_text(alpha[0])} if alpha else {}
+    return {"fill": color_text((red, green, blue))} | {name: text for name, text in sheer.items() if text}
 
 
 def color_text(color: Color) -> str:

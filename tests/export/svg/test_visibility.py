@@ -14,10 +14,10 @@ def test_a_layer_shows_through_those_above():
 def test_steps_are_from_what_lies_below():
     """White at one half on black is grey: to red from there is +½, −½, −½; on no ground alpha grows, too."""
     alphas, colors = np.array([[0.5], [1.0]]), np.array([[[1.0]] * 3, [[1.0], [0.0], [0.0]]])
-    first, second = steps_over(alphas, colors, np.zeros(3))
+    first, second = steps_over(alphas, colors, np.array([0, 0, 0, 1.0]))
     assert first[:, 0].tolist() == [1, 1, 1, 0]
     assert second[:, 0].tolist() == [0.5, -0.5, -0.5, 0]
-    first, second = steps_over(alphas, colors, None)
+    first, second = steps_over(alphas, colors, np.zeros(4))
     assert first[:, 0].tolist() == [1, 1, 1, 1]
     assert second[:, 0].tolist() == [0.5, -0.5, -0.5, 0.5]
 
