@@ -10,7 +10,7 @@ import sdf2vec.export
 import sdf2vec.fit
 import sdf2vec.render  # noqa: F401 (see above)
 
-from .api import check, export, exported, fit, fitted, render
+from .api import check, export, exported, fit, fitted, render, share_of
 from .errors import Sdf2vecError
 from .export.exported import Exported
 from .scene import Joint, Layer, Scene, SceneError, Shape
@@ -38,4 +38,5 @@ __all__ = [
     "loads",
     "render",
     "save",
+    "share_of",
 ]

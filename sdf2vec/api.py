@@ -8,9 +8,10 @@ from typing import TYPE_CHECKING, Any, Literal, Unpack
 
 from .declared import checked, documented
 from .deferred import deferred
+from .errors import Sdf2vecError
 from .export.exported import Exported
 from .export.options import Options
-from .exports import Exports
+from .exports import Exports, share_of_limit
 from .fit.settings import Settings, settings_of
 from .keywords import ExportKeywords, FitKeywords
 from .scene import SHOWN, Scene
@@ -47,17 +48,27 @@ def fitted(
     shapes: int | Literal["auto"] | None = None,
     *,
     callback: Callable[[Progress], bool] | None = None,
+    share: Callable[[Scene], float] | None = None,
     **options: Unpack[FitKeywords],
 ) -> Fitted:
     """Fits shapes to a picture, and tells what was decided about their number and whether a target was met.
 
     `image`: a path, bytes, a file object, a PIL image or an array [H, W], [H, W, 3] or [H, W, 4] (sRGB-coded;
     integers, or floats 0..1). `callback` is called with the progress after every step and ends the fit by returning
-    True. The same arguments give the same scene. `kind` and `palette` may also be sequences, `loss` pairs of name and
-    weight. Raises Sdf2vecError for anything that can't be fitted.
+    True. `share` says how much of a size limit a scene takes, 1 for all of it (`share_of(targets, max_bytes=…)`); an
+    automatic number of shapes keeps within it. The same arguments give the same scene. `kind` and `palette` may also be
+    sequences, `loss` pairs of name and weight. Raises Sdf2vecError for anything that can't be fitted.
     """
     settings = settings_of(shapes, **options)
-    return _fitted_picture(_load_picture(image), settings, callback or (lambda progress: False))
+    return _fitted_picture(_load_picture(image), settings, callback or (lambda progress: False), share)
+
+
+def share_of(targets: Sequence[str], **options: Unpack[ExportKeywords]) -> Callable[[Scene], float]:
+    """How much of `max_bytes` the largest of some exports of a scene takes, each in its smallest form: for `fitted`.
+
+    Raises Sdf2vecError for an unknown target and for a limit that is none.
+    """
+    return share_of_limit(targets, checked(Options, options))
 
 
 def render(scene: Scene, width: int | None = None, height: int | None = None) -> Float32Array:
@@ -75,9 +86,12 @@ def render(scene: Scene, width: int | None = None, height: int | None = None) ->
 def export(scene: Scene, target: str, **options: Unpack[ExportKeywords]) -> str | bytes:
     """The scene in a target format, a key of `sdf2vec.export.EXPORTERS`: text, or bytes for "pdf" and pictures.
 
-    Options: those of `exported`. Raises Sdf2vecError.
+    Options: those of `exported`. Raises Sdf2vecError, also for a size limit that can't be kept to.
     """
-    return exported(scene, target, **options).data
+    made = exported(scene, target, **options)
+    if not made.met:
+        raise Sdf2vecError(made.notes[-1])
+    return made.data
 
 
 @documented(Options)

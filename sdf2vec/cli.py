@@ -176,9 +176,10 @@ def _check_settings(work: Work, places: Places) -> None:
     settings = settings_of(**work.fit)
     exports = Exports(Scene(1, 1, (), compositing=settings.compositing))
     for target in places.targets:
-        options = replace(work.export, svg_size_limit=None, alone=places.files.get(target) == STREAM)
+        options = replace(work.export, alone=places.files.get(target) == STREAM)
         EXPORTERS[target].check_count(settings.most, options)
-        exports.export(target, options)
+        if not (made := exports.export(target, options)).met:
+            raise Sdf2vecError(made.notes[-1])
 
 
 # --- scene files --------------------------------------------------------------------------------------------
@@ -234,10 +235,10 @@ def _write_scene_exports(options: argparse.Namespace, places: Places) -> int:
     export = _export_options(options, places.targets)
     with telling(running, STREAM in job.outputs.values()) as teller:
         started = time.perf_counter()
-        write_exports(_read_scene(options.scene), job, export, teller)
+        written = write_exports(_read_scene(options.scene), job, export, teller)
         if running.verbose:
             teller.say(f"  {time.perf_counter() - started:.1f} s in all: {teller.about_phases()}")
-    return guard.OK
+    return guard.OK if written.met else guard.MISSED
 
 
 def _check_parser() -> argparse.ArgumentParser:

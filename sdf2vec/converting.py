@@ -6,7 +6,7 @@ import gzip
 import time
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 from msgspec.structs import replace
 
@@ -17,7 +17,7 @@ from .errors import Sdf2vecError
 from .export import EXPORTERS
 from .export.exported import Exported
 from .export.options import Options
-from .exports import Exports
+from .exports import Exports, share_of_limit
 from .files import one_line, shown_as, write_atomically
 from .outputs import STREAM, Job, beside_of, stem_of
 from .progress import Stop, Teller
@@ -73,7 +73,7 @@ def convert(job: Job, work: Work, teller: Teller, stop: Stop) -> Done:
     if left := checkpoint.begin(work.fit.get("start")):
         teller.say(left)
     with teller.phase("fit"):
-        fitted = _fit(picture, work, teller, stop, checkpoint)
+        fitted = _fit(picture, job, work, teller, stop, checkpoint)
         scene = fitted.scene
     seconds = time.perf_counter() - fitting
     with teller.phase("measure"):
@@ -91,7 +91,8 @@ def convert(job: Job, work: Work, teller: Teller, stop: Stop) -> Done:
     checkpoint.remove()
     seconds = time.perf_counter() - started
     teller.say(f"  {seconds:.1f} s in all{_phases(teller)}")
-    return Done(scene.shape_count, quality.psnr, quality.flip, written, seconds, stop.requested, fitted.met)
+    met = fitted.met and written.met
+    return Done(scene.shape_count, quality.psnr, quality.flip, written.bytes, seconds, stop.requested, met)
 
 
 def _phases(teller: Teller) -> str:
@@ -104,13 +105,28 @@ def _described(quality: Quality, picture: Picture) -> str:
     return f"PSNR {psnr:.2f} dB, FLIP {flip:.4f}{where}"
 
 
-def _fit(picture: Picture, work: Work, teller: Teller, stop: Stop, checkpoint: Checkpoint) -> Fitted:
+def _fit(
+    picture: Picture, job: Job, work: Work, teller: Teller, stop: Stop, checkpoint: Checkpoint
+) -> Fitted:
     def callback(progress: Progress) -> bool:
         teller.step(progress)
         checkpoint.see(progress)
         return stop.requested
 
-    return api.fitted(picture, callback=callback, **work.fit)
+    return api.fitted(picture, callback=callback, share=_share(job, work.export), **work.fit)
+
+
+def _share(job: Job, options: Options) -> Callable[[Scene], float] | None:
+    """How much of the size limit a scene takes, if there is one, in what is written and heeds it."""
+    if options.max_bytes is None:
+        return None
+    limited = [target for target in job.outputs if "max_bytes" in EXPORTERS[target].heeds]
+    return share_of_limit(limited, replace(options, title=_title(job, options)))
+
+
+def _title(job: Job, options: Options) -> str:
+    """That of the user, or else the input's name."""
+    return options.title or ("a picture" if job.source == STREAM else one_line(stem_of(job.source)))
 
 
 def _read_picture(source: str) -> tuple[Picture, Callable[[], bytes]]:
@@ -145,16 +161,23 @@ def _name(source: str) -> str:
 # --- exports --------------------------------------------------------------------------------------------------
 
 
-def write_exports(scene: Scene, job: Job, options: Options, teller: Teller) -> int:
-    """Writes the exports of a scene, by default titled after the input; how many bytes there are in all."""
-    title = options.title or ("a picture" if job.source == STREAM else one_line(stem_of(job.source)))
-    exports, written = Exports(scene), 0
+class Written(NamedTuple):
+    """How many bytes there are in all, and whether all keep to the size limit."""
+
+    bytes: int
+    met: bool
+
+
+def write_exports(scene: Scene, job: Job, options: Options, teller: Teller) -> Written:
+    """Writes the exports of a scene, by default titled after the input."""
+    title = _title(job, options)
+    exports, written, met = Exports(scene), 0, True
     for target, path in job.outputs.items():
         chosen = replace(options, title=title, alone=path == STREAM)
         with teller.phase(f"export {target}"):
             made = exports.export(target, chosen)
         _write(path, made.raw)
-        written += len(made.raw)
+        written, met = written + len(made.raw), met and made.met
         if path != STREAM:
             with teller.phase(f"check {target}"):
                 near = _figure(scene, target, made, chosen) if teller.running.check == "auto" else ""
@@ -162,7 +185,7 @@ def write_exports(scene: Scene, job: Job, options: Options, teller: Teller) -> i
             written += _write_beside(path, EXPORTERS[target].suffix, made.beside, teller)
         for note in made.notes:
             teller.say(f"  {note}")
-    return written
+    return Written(written, met)
 
 
 def _write_beside(path: str, suffix: str, files: Mapping[str, bytes], teller: Teller) -> int:

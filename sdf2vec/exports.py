@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from functools import cached_property
 
 from .declared import check_choice
 from .deferred import deferred
-from .export import EXPORTERS
+from .export import EXPORTERS, Exporter
+from .export.byte_limit import ByteLimit
 from .export.exported import Exported
 from .export.options import Options
 from .scene import Scene
@@ -29,13 +30,54 @@ class Exports:
         exporter.check_count(self.scene.shape_count, options)
         refusal = exporter.accepts(options).refusal(self.scene)
         if not refusal:
-            return exporter.write(self.scene, options)
+            return _made(exporter, self.scene, options)
         scene, decibels = self._over
         near = f" ({decibels:.1f} dB from its render)" if scene.layers else ""
         note = f"{target}: nothing can be added up {refusal}: fitted again under over{near}"
-        made = exporter.write(scene, options)
+        made = _made(exporter, scene, options)
         return replace(made, notes=(note, *made.notes))
+
+    def smallest(self, target: str, options: Options) -> Exported:
+        """The smallest form of one export."""
+        exporter = EXPORTERS[target]
+        scene = self._over[0] if exporter.accepts(options).refusal(self.scene) else self.scene
+        smaller = exporter.smaller(scene, options)
+        return smaller[-1]() if smaller else exporter.write(scene, options)
 
     @cached_property
     def _over(self) -> tuple[Scene, float]:
         return _over_of(self.scene)
+
+
+def _made(exporter: Exporter, scene: Scene, options: Options) -> Exported:
+    """The finest that keeps to the size limit; where none does, the smallest."""
+    made = exporter.write(scene, options)
+    if options.max_bytes is None:
+        return made
+    limit = ByteLimit.of(options.max_bytes)
+    if limit.share(made.raw) <= 1:
+        return made
+    for make in exporter.smaller(scene, options):
+        smaller = make()
+        if limit.size(smaller.raw) < limit.size(made.raw):
+            made = smaller
+        if limit.share(made.raw) <= 1:
+            return made
+    name, size = exporter.suffix[1:], limit.size(made.raw)
+    much = (
+        f"{name}: {size:,} bytes at least, more than the limit of {limit}; fit fewer shapes, or --shapes auto"
+    )
+    return replace(made, notes=(*made.notes, much), met=False)
+
+
+def share_of_limit(targets: Sequence[str], options: Options) -> Callable[[Scene], float]:
+    """How much of the size limit the largest of some exports of a scene takes, each in its smallest form."""
+    limit = ByteLimit.of(options.max_bytes or "")
+    for target in targets:
+        check_choice("target", target, EXPORTERS)
+
+    def share(scene: Scene) -> float:
+        exports = Exports(scene)
+        return max(limit.share(exports.smallest(target, options).raw) for target in targets)
+
+    return share

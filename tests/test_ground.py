@@ -65,7 +65,7 @@ def test_shaders_draw_it(target, compositing, require_engine):
     ("target", "engine", "options"),
     [
         ("svg", "resvg", {}),
-        ("svg", "resvg", {"svg_size_limit": 3000}),
+        ("svg", "resvg", {"max_bytes": 3000}),
         ("svg", "cairosvg", {"svg_profile": "portable"}),
         ("pdf", "pdfium", {}),
     ],

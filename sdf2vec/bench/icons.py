@@ -34,7 +34,7 @@ SIDE = 256  # pixels
 SHOWN = 8  # icons of the figure
 ZIPPED = 9  # gzip's level
 NEAR = 0.02  # ΔE00 that is no difference
-LIMIT = "svg_size_limit"
+LIMIT = "max_bytes"
 GIVEN = ("kind", "preset", "max_falloff", LIMIT)  # options of the fit and of its export
 
 
@@ -113,7 +113,7 @@ def _fitted(
     started = time.process_time()
     fit = {name: value for name, value in options.items() if name != LIMIT}
     scene = api.fit(picture, shapes, **fit)  # type: ignore[arg-type] # "auto", where it can
-    text = str(api.export(scene, "svg", svg_size_limit=options.get(LIMIT)))
+    text = str(api.exported(scene, "svg", max_bytes=options.get(LIMIT)).data)
     drawing, drawn = measured(text, picture, len(scene.layers), time.process_time() - started)
     return drawing._replace(parameters=parameters_of(scene)), drawn
 
@@ -236,7 +236,7 @@ def main() -> None:
     parser.add_argument("--kind", help="of the fit")
     parser.add_argument("--preset", help="of the fit")
     parser.add_argument("--max-falloff", type=float, help="of the fit")
-    parser.add_argument("--svg-size-limit", type=int, help="of the export")
+    parser.add_argument("--max-bytes", help="of the export")
     parser.add_argument("--hands", default=",".join(HANDS), help="whose drawings are compared")
     parser.add_argument("-o", "--output", type=Path, required=True)
     options = parser.parse_args()

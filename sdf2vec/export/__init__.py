@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import partial
 
@@ -19,8 +19,10 @@ class Exporter:
     """`suffix` is what a file name gets in place of the picture's; `about` is one line for the user.
 
     `accepts` says which scenes `write` takes, `most_shapes` how many shapes they may have; `heeds` names the options
-    that matter to it; other files that it may write end in `beside`. A file that ends in one of `endings` is taken to
-    be for it; one that holds `mark` was made by it. `is_text`: it writes text, not bytes; `is_picture`: the render.
+    that matter to it; other files that it may write end in `beside`. `smaller(scene, options)` makes what takes fewer
+    bytes than `write`, ever coarser or denser; each is made when it is called. A file that ends in one of `endings` is
+    taken to be for it; one that holds `mark` was made by it. `is_text`: it writes text, not bytes; `is_picture`: the
+    render.
     """
 
     suffix: str
@@ -31,6 +33,7 @@ class Exporter:
     other_endings: tuple[str, ...] = ()
     beside: tuple[str, ...] = ()
     mark: bytes = MARK.encode()
+    smaller: Callable[[Scene, Options], Sequence[Callable[[], Exported]]] = lambda scene, options: ()
     is_text: bool = True
     is_picture: bool = False
     most_shapes: Callable[[Options], int] = lambda options: MAX_SHAPES
@@ -59,22 +62,23 @@ def _shader(
     beside: tuple[str, ...] = (),
 ) -> Exporter:
     module = "sdf2vec.export.shader"
-    write, most_shapes = deferred(module, "exported"), deferred(module, "most_shapes")
+    write, most_shapes, smaller = (deferred(module, name) for name in ("exported", "most_shapes", "smaller"))
     return Exporter(
         suffix,
         partial(write, name=name, suffix=suffix),
         about,
-        heeds=("layout", *heeds, "title"),
+        heeds=("layout", *heeds, "max_bytes", "title"),
         other_endings=endings,
         beside=beside,
+        smaller=partial(smaller, name=name),
         most_shapes=partial(most_shapes, name=name),
     )
 
 
 def _svg(name: str, suffix: str, about: str, endings: tuple[str, ...] = ()) -> Exporter:
-    module, heeds = "sdf2vec.export.svg", ("svg_profile", "svg_size_limit", "title", "alt")
-    accepts = deferred(module, "accepts")
-    return Exporter(suffix, deferred(module, name), about, accepts, heeds, endings)
+    module, heeds = "sdf2vec.export.svg", ("svg_profile", "max_bytes", "title", "alt")
+    accepts, smaller = deferred(module, "accepts"), deferred(module, f"smaller_{name}")
+    return Exporter(suffix, deferred(module, name), about, accepts, heeds, endings, smaller=smaller)
 
 
 def _raster(name: str, about: str, *endings: str) -> Exporter:
@@ -119,7 +123,8 @@ EXPORTERS: dict[str, Exporter] = {
         deferred("sdf2vec.export.svg", "pdf"),
         "the portable SVG as PDF, by CairoSVG",
         lambda options: Accepts(("over",)),
-        ("svg_size_limit", "title"),
+        ("max_bytes", "title"),
+        smaller=deferred("sdf2vec.export.svg", "smaller_pdf"),
         mark=b"/Producer (" + MARK.encode(),
         is_text=False,
     ),
@@ -127,7 +132,7 @@ EXPORTERS: dict[str, Exporter] = {
         ".html",
         deferred("sdf2vec.export.page", "html"),
         "one page without dependencies: shader, drawing, copy buttons",
-        heeds=("title", "alt", "original"),
+        heeds=("max_bytes", "title", "alt", "original"),
         other_endings=(".htm",),
         mark=b'<meta name="generator" content="sdf2vec">',
     ),
@@ -141,6 +146,7 @@ EXPORTERS: dict[str, Exporter] = {
         ".scene.json",
         deferred("sdf2vec.export.raster", "json"),
         "the scene itself",
+        heeds=("max_bytes",),
         other_endings=(".json",),
         mark=f'"format": "{FORMAT}"'.encode(),
     ),

@@ -11,12 +11,17 @@ MARK = "Made with sdf2vec"  # what nearly every export says of itself: such file
 @dataclass(frozen=True)
 class Exported:
     """An export: its text or bytes; files that belong beside it, by what takes the place of its suffix; what was chosen
-    or given up, a line each; `error`: how far it is off from the scene by construction, at most, in 8-bit levels."""
+    or given up, a line each.
+
+    `error`: how far it is off from the scene by construction, at most, in 8-bit levels. `met`: whether it keeps to the
+    size limit.
+    """
 
     data: str | bytes
     beside: Mapping[str, bytes] = field(default_factory=dict)
     notes: tuple[str, ...] = ()
     error: float = 0.0
+    met: bool = True
 
     @property
     def raw(self) -> bytes:

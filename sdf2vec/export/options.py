@@ -17,9 +17,6 @@ SVG_PROFILES = ("filters", "portable", "inkscape")
 
 
 Size = Annotated[int, number("size in pixels", "PIXELS", 1, 16384, "shortest side of a PNG, JPEG or WebP")]
-SizeLimit = Annotated[
-    int, number("SVG size limit in bytes", "BYTES", 1, None, "draw an SVG coarser where it would be larger")
-]
 
 
 class Options(Struct, frozen=True, kw_only=True):
@@ -48,7 +45,17 @@ class Options(Struct, frozen=True, kw_only=True):
             SVG_PROFILES,
         ),
     ] = SVG_PROFILES[0]
-    svg_size_limit: SizeLimit | None = None
+    max_bytes: (
+        Annotated[
+            str | int,
+            plain(
+                "at most so many bytes, of 4000gz gzipped: fewer shapes where their number is auto, coarser drawings, "
+                "denser text",
+                "BYTES",
+            ),
+        ]
+        | None
+    ) = None
     title: Annotated[str, plain("what an export calls the picture (default: its name)", "TEXT")] = "a picture"
     alt: Annotated[str, plain("what is in the picture, for who can't see an SVG or a page", "TEXT")] = ""
     alone: Annotated[bool, plain("no files beside the text")] = False

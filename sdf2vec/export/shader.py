@@ -22,6 +22,7 @@ from ..operation import VEC2, VEC4
 from ..paints import FLAT
 from ..scene import MAX_SHAPES, Layer, Scene
 from ..templating import template
+from .dense_text import dense
 from .exported import Exported
 from .knobs import BREATH, GROUND, breath, dragged, knobs_of, turned
 from .layouts import (
@@ -43,6 +44,7 @@ from .tiles import COARSEST, Tiles
 packed_text: Callable[..., Any] = deferred("sdf2vec.export.packed_text", "PackedText")  # needs torch
 SEEN = var("{seen}", VEC4)  # where a template puts the colour that is seen
 MOST_READABLE = TEXT_LIMIT // 50  # shapes; none is said in so few bytes
+TEXTS = ("readable", "table", "packed")  # layouts that may take the fewest bytes
 DATA_WIDTH = 256  # texels in a row of a data texture
 
 
@@ -95,6 +97,23 @@ def exported(scene: Scene, options: Options, name: str, suffix: str) -> Exported
     made = shader(scene, name, options)
     beside = {} if TARGETS[name].host is EMBEDDED else files_beside(made, suffix)
     return Exported(made.text, beside, (made.about,), made.error)
+
+
+def smaller(scene: Scene, options: Options, name: str) -> list[Callable[[], Exported]]:
+    """The layout that takes the fewest bytes, as dense as can be."""
+    target = TARGETS[name]
+    if target.host is EMBEDDED:
+        return []
+    layouts = [layout for layout in TEXTS if layout in _host(target, options).layouts]
+    asked = layouts if options.layout == "auto" else [options.layout]
+
+    def densest() -> Exported:
+        made = (shader(scene, name, structs.replace(options, layout=layout)) for layout in asked)
+        texts = [(dense(one.text, renamed=target.host is PASTED), one) for one in made]
+        text, best = min(texts, key=lambda found: len(found[0].encode()))
+        return Exported(text, {}, (f"{best.about}; without comments, names and spaces",), best.error)
+
+    return [densest]
 
 
 def shader(scene: Scene, name: str, options: Options) -> Shader:

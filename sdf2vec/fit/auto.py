@@ -22,6 +22,7 @@ from ..render.tensors import SceneTensors, to_scene
 from ..scene import Scene
 from ..threads import threads_of_its_own
 from .backends import CPU, choose
+from .byte_budget import Share, within
 from .initialization import Layers, background_of, empty_groups
 from .joining import Search
 from .loop import Callback, Progress, Stopped, fit_picture, scaled, view_of
@@ -55,16 +56,37 @@ class Fitted:
 
 
 def fitted_picture(
-    picture: Picture, settings: Settings, callback: Callback = lambda progress: False
+    picture: Picture,
+    settings: Settings,
+    callback: Callback = lambda progress: False,
+    share: Share | None = None,
 ) -> Fitted:
     """Fits shapes to a picture, as many as the settings say or as it needs. The same settings give the same scene.
+
+    `share` says how much of a size limit a scene takes; where the number of shapes is auto, it takes at most all.
 
     The callback runs after every step; when it returns True, the fit ends and what is there is returned. Raises
     Sdf2vecError where the start scene does not suit the picture or the settings, and for a device that is not here.
     """
     choose(settings.device)  # drawings are searched on the CPU, but what is asked for must be there
     with threads_of_its_own():
-        return _few(picture, settings, callback) or _painted(picture, settings, callback)
+        if share is None or settings.shapes != AUTO:
+            return _few(picture, settings, callback) or _painted(picture, settings, callback)
+        return _within(picture, settings, callback, share)
+
+
+def _within(picture: Picture, settings: Settings, callback: Callback, share: Share) -> Fitted:
+    """What a size limit holds: the shapes of a drawing, those that meet a target, or as many as there is room for."""
+    has_target = (settings.target_psnr, settings.target_flip) != (None, None)
+    found = _few(picture, settings, callback)
+    if has_target and found is None:
+        found = _painted(picture, settings, callback)
+    if found is not None and share(found.scene) <= 1.0:
+        return found
+    scene, taken = within(picture, settings, share, callback)
+    met = taken <= 1.0 and not (has_target and _missed(scene, picture, settings) > 0)
+    missed = f"; {_wanted(settings)} is not reached" if has_target else ""
+    return Fitted(scene, f"{_counted(scene)}: {taken:.0%} of the size limit{missed}", met)
 
 
 def _few(picture: Picture, settings: Settings, callback: Callback) -> Fitted | None:

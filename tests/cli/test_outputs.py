@@ -359,3 +359,18 @@ def test_notes_stay_out_of_an_export_on_standard_output(folder, run):
     outcome = run("print.jpg", *SHORT, "--emit", "json", "-o", "-")
     assert json.loads(outcome.out)["width"] == 24
     assert "CMYK" in outcome.err
+
+
+def test_a_size_limit_is_kept_to(folder, run):
+    done = run("photo.jpg", "-o", "photo.svg", "--max-bytes", "900", "--preset", "fast", "--check", "off")
+    assert done.code == 0
+    assert 600 <= len((folder / "photo.svg").read_bytes()) <= 900
+    assert b"of the size limit" in done.out
+
+
+def test_a_limit_that_a_number_of_shapes_does_not_keep_to(folder, run):
+    """The smallest drawing is written, and the exit status says so."""
+    done = run("photo.jpg", "--shapes", "5", "-o", "photo.svg", "--max-bytes", "250", "--preset", "fast")
+    assert done.code == 4
+    assert b"bytes at least, more than the limit of 250 bytes" in done.out
+    assert (folder / "photo.svg").read_bytes()

@@ -113,7 +113,7 @@ def attack_scenes(seed):
         "glsl": r.choice(list(GLSL_VERSIONS)),
         "layout": r.choice([LAYOUTS[0], *LAYOUTS]),
         "svg_profile": r.choice(SVG_PROFILES),
-        "svg_size_limit": r.choice([None, None, 2000, 20_000]),
+        "max_bytes": r.choice([None, None, 2000, 20_000]),
         "title": r.choice(["a", "</script>-->]]>*/\n\"'&\u202e\udc80"]),
         "size": r.choice([None, 1, 30]) if target == "png" else None,
         "alone": r.random() < 0.3,

@@ -6,6 +6,7 @@ import base64
 import re
 from collections.abc import Callable
 from dataclasses import replace
+from functools import partial
 from urllib.parse import quote
 
 from ...deferred import deferred
@@ -33,27 +34,22 @@ def accepts(options: Options) -> Accepts:
 
 
 def svg(scene: Scene, options: Options) -> Exported:
-    """The scene as SVG text in pixels of the fitted picture: the finest drawing that keeps to the size limit.
-
-    Raises Sdf2vecError for a limit that can't be met, and for a scene that is not accepted.
-    """
-    return _exported(scene, options, options.svg_profile)
+    """The scene as SVG text in pixels of the fitted picture. Raises Sdf2vecError for a scene that is not accepted."""
+    return _made(_planner(scene, options.svg_profile), DETAILS[0], options)
 
 
-def _exported(scene: Scene, options: Options, profile: str) -> Exported:
-    limit = options.svg_size_limit
-    planner = _planner(scene, profile)
-    if limit is None:
-        return Exported(_text(planner, DETAILS[0], options))
-    size = 0
-    for detail in planner.details:
-        text = _text(planner, detail, options)
-        size = len(text.encode())
-        if size <= limit:
-            return Exported(text, notes=() if detail is DETAILS[0] else (_coarser(detail, limit),))
-    sharp = ", or sharp ones (--max-falloff 0)" if any(planner.soft) else ""
-    raise Sdf2vecError(
-        f"svg: {size:,} bytes at least, more than the limit of {limit:,}; fit fewer shapes{sharp}"
+def smaller_svg(scene: Scene, options: Options) -> list[Callable[[], Exported]]:
+    """Ever coarser drawings."""
+    return _smaller(_planner(scene, options.svg_profile), options)
+
+
+def _smaller(planner: Planner, options: Options) -> list[Callable[[], Exported]]:
+    return [partial(_made, planner, detail, options) for detail in planner.details[1:]]
+
+
+def _made(planner: Planner, detail: Detail, options: Options) -> Exported:
+    return Exported(
+        _text(planner, detail, options), notes=() if detail is DETAILS[0] else (_coarser(detail),)
     )
 
 
@@ -65,7 +61,16 @@ def smallest(scene: Scene, options: Options) -> str:
 
 def data_uri(scene: Scene, options: Options) -> Exported:
     """The SVG as a data URI, for `src="…"` and `url("…")`: URL-encoded, or in base64 where that is smaller."""
-    made = svg(scene, options)
+    return _as_uri(partial(svg, scene, options))
+
+
+def smaller_data_uri(scene: Scene, options: Options) -> list[Callable[[], Exported]]:
+    """Ever coarser drawings."""
+    return [partial(_as_uri, make) for make in smaller_svg(scene, options)]
+
+
+def _as_uri(make: Callable[[], Exported]) -> Exported:
+    made = make()
     encoded = "data:image/svg+xml;base64," + base64.b64encode(made.raw).decode()
     return replace(made, data=min(f"data:image/svg+xml,{_quoted(str(made.data))}", encoded, key=len))
 
@@ -78,7 +83,16 @@ def _quoted(text: str) -> str:
 
 def pdf(scene: Scene, options: Options) -> Exported:
     """The portable SVG as PDF, by CairoSVG. Raises Sdf2vecError where cairo is not installed."""
-    made = _exported(scene, options, PORTABLE)
+    return _as_pdf(partial(_made, _planner(scene, PORTABLE), DETAILS[0], options))
+
+
+def smaller_pdf(scene: Scene, options: Options) -> list[Callable[[], Exported]]:
+    """Ever coarser drawings."""
+    return [partial(_as_pdf, make) for make in _smaller(_planner(scene, PORTABLE), options)]
+
+
+def _as_pdf(make: Callable[[], Exported]) -> Exported:
+    made = make()
     try:
         found = svg2pdf(bytestring=made.raw)
     except OSError:  # the package is there, the system's library is not
@@ -102,8 +116,8 @@ def _text(planner: Planner, detail: Detail, options: Options) -> str:
     return written(drawn, one_line(options.title), style, one_line(options.alt) if options.alt else "")
 
 
-def _coarser(detail: Detail, limit: int) -> str:
+def _coarser(detail: Detail) -> str:
     if detail.grain:
-        return f"svg: drawn in the smallest form to stay below {limit:,} bytes (coarse coordinates, colours, blurs)"
+        return "svg: drawn in the smallest form (coarse coordinates, colours, blurs)"
     blurs = f", blurs down to {detail.target:g} dB" if detail.target else ", blurs for all polygons"
-    return f"svg: drawn coarser to stay below {limit:,} bytes (edges to {detail.levels:g} levels{blurs})"
+    return f"svg: drawn coarser (edges to {detail.levels:g} levels{blurs})"

@@ -9,10 +9,8 @@ from xml.etree import ElementTree
 import numpy as np
 import torch
 
-from sdf2vec import Layer, Scene, Shape
+from sdf2vec import Layer, Scene, Shape, exported
 from sdf2vec.engines import ENGINES
-from sdf2vec.export.options import Options
-from sdf2vec.export.svg import svg as write_svg
 from sdf2vec.image import premultiply
 from sdf2vec.render.reference import render
 
@@ -37,7 +35,7 @@ def triangle(*points, falloff=0.0, color=WHITE):
 @cache
 def made(scene, **options):
     """A scene's SVG, made once for all that look at it."""
-    return write_svg(scene, Options(**options))
+    return exported(scene, "svg", **options)
 
 
 def text_of(scene, **options):

@@ -1,6 +1,7 @@
 """The whole document: well-formed by an independent parser, sharp shapes with coordinates by hand."""
 
 import base64
+import gzip
 import math
 import re
 from dataclasses import replace
@@ -11,7 +12,7 @@ from xml.etree import ElementTree
 import numpy as np
 import pytest
 
-from sdf2vec import Layer, Scene, Sdf2vecError, Shape
+from sdf2vec import Layer, Scene, Sdf2vecError, Shape, export, exported
 from sdf2vec.export.options import Options
 from sdf2vec.export.svg import _quoted, accepts, data_uri, pdf
 from sdf2vec.export.svg import svg as write_svg
@@ -107,19 +108,31 @@ def test_portable_has_neither_filters_nor_blend_modes():
 def test_a_size_limit_is_kept_or_refused():
     scene = random_scene(("box", "triangle"), layers=40, seed=7, paints=("flat",), joins=())
     free = len(text_of(scene).encode())
-    assert len(text_of(scene, svg_size_limit=free).encode()) == free
-    limited = write_svg(scene, Options(svg_size_limit=free // 2))
+    assert len(text_of(scene, max_bytes=free).encode()) == free
+    limited = exported(scene, "svg", max_bytes=free // 2)
+    assert limited.met
     assert len(limited.raw) <= free // 2
     assert any("drawn coarser" in note for note in limited.notes)
-    with pytest.raises(Sdf2vecError, match=r"^svg: [\d,]+ bytes at least, more than the limit of 500"):
-        text_of(scene, svg_size_limit=500)
-    with pytest.raises(Sdf2vecError, match=r"bytes at least.*sharp ones \(--max-falloff 0\)"):
-        text_of(scene, svg_size_limit=40 * 170, svg_profile="portable")
+    with pytest.raises(Sdf2vecError, match=r"^svg: [\d,]+ bytes at least, more than the limit of 500 bytes"):
+        export(scene, "svg", max_bytes=500)
+    assert not exported(scene, "svg", max_bytes=40 * 170, svg_profile="portable").met
     sharp = replace(scene, layers=tuple(replace(layer, falloff=0.0) for layer in scene.layers))
-    small = text_of(sharp, svg_size_limit=40 * 120, svg_profile="portable")
+    small = text_of(sharp, max_bytes=40 * 120, svg_profile="portable")
     assert not re.search(r"<filter|filter:|class=", small)
-    with pytest.raises(Sdf2vecError, match=r"of 500; fit fewer shapes$"):
-        text_of(sharp, svg_size_limit=500)
+
+
+@pytest.mark.usefixtures("drawn_once")
+def test_a_limit_may_be_that_of_the_gzipped_text():
+    scene = random_scene(("box", "triangle"), layers=40, seed=7, paints=("flat",), joins=())
+    free = len(gzip.compress(exported(scene, "svg").raw, 9))
+    limited = exported(scene, "svg", max_bytes=f"{free // 2}gz")
+    assert len(gzip.compress(limited.raw, 9)) <= free // 2 < len(limited.raw)
+
+
+@pytest.mark.parametrize("limit", ["", "0", "-1", "4k", "4000 gz", 0, True])
+def test_what_is_no_limit_is_refused(limit):
+    with pytest.raises(Sdf2vecError, match="a number of bytes, as 4000, or gzipped 4000gz"):
+        exported(scene_of(), "svg", max_bytes=limit)
 
 
 @pytest.mark.parametrize("title", ["photo", "a 'quoted' \"50 %\" #1 & <more>", "写真" * 2000])

@@ -14,7 +14,7 @@ from sdf2vec.export.svg.canvas import Canvas
 from sdf2vec.export.svg.isobands import WORK, trace_grid
 from sdf2vec.export.svg.visibility import LONG, layers_at
 
-PROFILES = [{}, {"svg_profile": "portable"}, {"svg_size_limit": 3000}]
+PROFILES = [{}, {"svg_profile": "portable"}, {"max_bytes": 3000}]
 
 
 def disc(x, color, radius=0.2):

@@ -34,7 +34,7 @@ def test_the_smallest_drawing_still_looks_like_the_render(engine, require_engine
         falloff = (0.0, 0.06, 0.15, 0.3)[index // 4 % 4]
         layers.append(Layer((random_shape(kinds[index % 4], r),), falloff, r.uniform(0.3, 1.0)))
     scene = Scene(300, 200, tuple(layers), (0.3, 0.4, 0.5))
-    limit = {"svg_size_limit": 24 * 178}
+    limit = {"max_bytes": 24 * 178}
     (note,) = made(scene, **limit).notes
     assert "smallest form" in note
     (group,) = (element for element in parsed(scene, **limit) if element.tag == f"{NAMESPACE}g")

@@ -1,0 +1,111 @@
+"""As many shapes as so many bytes of an export can say, of the sort that says most with them."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterator
+from dataclasses import replace
+from typing import NamedTuple
+
+from msgspec import structs
+
+from ..image import Picture
+from ..quality import psnr_of
+from ..render.tensors import SceneTensors, from_scene, to_scene
+from ..scene import Scene
+from .initialization import background_of
+from .loop import Callback, fit_picture, view_of
+from .settings import Settings
+from .sparse import error_of, without
+from .surroundings import View
+
+Share = Callable[[Scene], float]  # of a size limit, above 1 for what is too large
+PROBED = 16  # shapes of each sort that are tried first
+ENOUGH = 0.93  # of the limit, that is to be used
+FITS = 3  # of full length, at most
+SLOPE = 1.7  # dB for twice the shapes, about
+RESOLUTION = 128  # pixels squared, where it is seen which shapes matter least
+
+
+class Probe(NamedTuple):
+    """One sort of shapes: how to fit them, the share that each takes, how many there may be, what PSNR is to be had."""
+
+    settings: Settings
+    each: float
+    wanted: int
+    hoped: float  # dB
+
+
+def within(picture: Picture, settings: Settings, share: Share, callback: Callback) -> tuple[Scene, float]:
+    """The nearest scene found that keeps within the limit, and its share; else the ground alone."""
+    view = view_of(picture.premultiplied, settings, RESOLUTION)
+    nothing = _nothing(picture, settings, view)
+    empty = share(nothing)
+    best, near = (nothing, empty), psnr_of(nothing, picture)
+    if empty >= 1.0:
+        return best
+    probes = [_probe(sort, picture, share, callback) for sort in _sorts(settings)]
+    chosen = max(probes, key=lambda probe: probe.hoped)
+    each, count = chosen.each, chosen.wanted
+    for _ in range(FITS):
+        scene = fit_picture(picture, structs.replace(chosen.settings, shapes=count), callback)
+        taken = share(scene)
+        each = (taken - empty) / count
+        scene, taken = _trimmed(scene, view, share, each, taken)
+        if (now := psnr_of(scene, picture)) > near:
+            best, near = (scene, taken), now
+        more = min(math.floor((1.0 - empty) / each), settings.most)
+        if taken >= ENOUGH or more <= count:
+            break
+        count = more
+    return best
+
+
+def _nothing(picture: Picture, settings: Settings, view: View) -> Scene:
+    """The ground alone."""
+    size = (
+        picture.width / min(picture.width, picture.height),
+        picture.height / min(picture.width, picture.height),
+    )
+    ground = SceneTensors([], background_of(view.target), settings.compositing, size)
+    return to_scene(ground, picture.width, picture.height)
+
+
+def _sorts(settings: Settings) -> Iterator[Settings]:
+    """Soft and sharp shapes, and circles, which a shader says in few words; whatever the user has left open."""
+    edges = [None, 0.0] if settings.max_falloff is None else [settings.max_falloff]
+    for edge in edges:
+        yield structs.replace(settings, max_falloff=edge)
+    if not settings.kind:
+        yield structs.replace(settings, kind=("circle",))
+
+
+def _probe(settings: Settings, picture: Picture, share: Share, callback: Callback) -> Probe:
+    """What a fit of few shapes promises of one of as many as the limit can hold."""
+    count = min(PROBED, settings.most)
+    few = fit_picture(picture, structs.replace(settings, shapes=count, preset="fast"), callback)
+    least, most = share(replace(few, layers=few.layers[:1])), share(few)
+    each = max((most - least) / max(count - 1, 1), 1e-9)
+    wanted = 1 + math.floor((1.0 - least) / each) if least <= 1 else 0
+    hoped = psnr_of(few, picture) + SLOPE * math.log2(max(wanted, 1e-3) / count)
+    return Probe(settings, each, min(max(wanted, 1), settings.most), hoped)
+
+
+def _trimmed(scene: Scene, view: View, share: Share, each: float, taken: float) -> tuple[Scene, float]:
+    """The scene without the shapes that matter least, as far as the limit asks for it."""
+    tensors = from_scene(scene)
+    while taken > 1.0 and tensors.layer_count:
+        surplus = math.ceil((taken - 1.0) / each)
+        tensors = _lighter(tensors, view, min(max(surplus, 1), tensors.layer_count))
+        scene = to_scene(tensors, scene.width, scene.height)
+        taken = share(scene)
+    return scene, taken
+
+
+def _lighter(scene: SceneTensors, view: View, count: int) -> SceneTensors:
+    """The scene without so many layers: those without one of which it is least wrong."""
+    errors = [error_of(without(scene, order), view) for order in range(scene.layer_count)]
+    least = sorted(range(len(errors)), key=errors.__getitem__)[:count]
+    for order in sorted(least, reverse=True):
+        scene = without(scene, order)
+    return scene

@@ -1,0 +1,64 @@
+"""As many shapes as a size limit holds, measured by a made-up size: so much for each shape."""
+
+import numpy as np
+import pytest
+
+from sdf2vec import Sdf2vecError, fit, fitted, share_of
+from sdf2vec.image import Picture, resize
+
+
+def noise():
+    """Nothing that a few shapes could be."""
+    coarse = np.random.default_rng(0).random((8, 12, 3), dtype=np.float32)
+    return Picture(np.ascontiguousarray(resize(coarse, 48, 32)))
+
+
+def by_count(most, ground=0.0):
+    """All of the limit at so many shapes."""
+    return lambda scene: ground + (1.0 - ground) * scene.shape_count / most
+
+
+@pytest.mark.parametrize("most", [5, 24])
+def test_as_many_shapes_as_there_is_room_for(most):
+    found = fitted(noise(), preset="fast", kind="triangle", max_falloff=0.0, share=by_count(most, 0.25))
+    assert found.scene.shape_count == most
+    assert found.met
+    assert "100% of the size limit" in found.reason
+
+
+def test_the_largest_number_of_shapes_holds_too():
+    found = fitted(noise(), preset="fast", kind="circle", max_falloff=0.0, max_shapes=6, share=by_count(50))
+    assert found.scene.shape_count == 6
+    assert found.met
+
+
+def test_what_matters_least_is_left_out():
+    """Later shapes are larger here, so that the guess is too high."""
+    found = fitted(
+        noise(),
+        preset="fast",
+        kind="circle",
+        max_falloff=0.0,
+        share=lambda scene: max(scene.shape_count, scene.shape_count * 2 - 16) / 20,
+    )
+    assert 15 <= found.scene.shape_count <= 18
+    assert found.met
+
+
+def test_a_limit_below_the_ground_is_said():
+    found = fitted(noise(), preset="fast", share=lambda scene: 2.0)
+    assert not found.met
+    assert found.scene.shape_count == 0
+
+
+def test_a_number_that_was_told_stays():
+    assert fitted(noise(), 6, preset="fast", share=by_count(2)).scene.shape_count == 6
+
+
+def test_the_share_is_that_of_the_largest_export():
+    scene = fit(noise(), 5, preset="fast", max_falloff=0.0)
+    svg, text = (share_of([target], max_bytes=4000)(scene) for target in ("svg", "shadertoy"))
+    assert share_of(["svg", "shadertoy"], max_bytes=4000)(scene) == max(svg, text)
+    assert share_of(["svg"], max_bytes=2000)(scene) == 2 * svg
+    with pytest.raises(Sdf2vecError, match="unknown target"):
+        share_of(["eps"], max_bytes=4000)
