@@ -94,9 +94,9 @@ def test_layers_come_in_draw_order():
 def test_additive_scenes_are_refused(profile):
     options = Options(svg_profile=profile)
     assert accepts(options).compositing == ("over",)
-    for export in (write_svg, data_uri, pdf):
+    for make in (write_svg, data_uri, pdf):
         with pytest.raises(Sdf2vecError, match=r"^svg: takes scenes under over, not additive$"):
-            export(Scene(3, 2, (), (0.5, 0.5, 0.5), "additive"), options)
+            make(Scene(3, 2, (), (0.5, 0.5, 0.5), "additive"), options)
 
 
 def test_portable_has_neither_filters_nor_blend_modes():
