@@ -82,8 +82,9 @@ def _convert_parser() -> argparse.ArgumentParser:
         usage="sdf2vec INPUT... [--emit TARGETS] [-o OUT] [options]",
         description="Fits a few soft geometric shapes to pictures and exports them as mathematics.",
         epilog="Other commands, each with its own --help: sdf2vec check | render | export | cache | completion. "
-        "--warm-up compiles all that fits may need. --traceback shows where an error that is a bug came from. Exit status: 0; 2 for what you can mend, 3 where "
-        "only some pictures failed, 4 where a target was not reached (the nearest is written), 70 for a bug.",
+        "--warm-up compiles all that fits may need. --traceback shows where an error that is a bug came from. "
+        "Exit status: 0; 2 for what you can mend, 3 where only some pictures failed, 4 where a target was not reached "
+        "(the nearest is written), 70 for a bug.",
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
     parser.add_argument(

@@ -195,10 +195,12 @@ def plan(
     jobs = [Job(source, places.outputs(source, within)) for source, within in sources.items()]
     read = {str(Path(path).resolve()) for path in (*sources, *also_read) if path != STREAM}
     taken: dict[str, str] = {}
+    tried: set[Path] = set()
     for job in jobs:
         for target, path in job.outputs.items():
             if path != STREAM:
                 _claim(path, job.source, taken, read)
+                require_writable(path, tried)
                 if not force:
                     _refuse_foreign(path, EXPORTERS[target])
     return jobs
@@ -212,7 +214,6 @@ def _claim(path: str, source: str, taken: dict[str, str], read: set[str]) -> Non
         both = f"both {one_line(taken[resolved])} and {one_line(source)}"
         raise Sdf2vecError(f"{one_line(path)}: {both} would be written there; convert them apart")
     taken[resolved] = source
-    require_writable(path)
 
 
 def _refuse_foreign(path: str, exporter: Exporter) -> None:
