@@ -310,7 +310,7 @@ def test_thin_pictures(folder, run, size, kind):
         assert rendered.size == size
 
 
-def test_a_large_picture(folder, run, kernels_there):
+def test_a_large_picture(folder, run):
     Image.linear_gradient("L").resize((4000, 3000)).save(folder / "large.bmp")
     outcome = run("large.bmp", *SHORT, "--shapes", "5", "--kind", "circle", "--emit", "json,svg")
     assert outcome.code == 0
