@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Literal, NoReturn
 from msgspec.structs import replace
 
 from . import __version__, cached, completing, guard, warming
-from .batch import Batch, about, about_left, exit_status, run_batch
+from .batch import Batch, about, about_left, check_streams, exit_status, run_batch
 from .converting import Work, write_exports
 from .declared import add_flags, checked, chosen, options_of
 from .deferred import deferred
@@ -155,6 +155,7 @@ def _convert(arguments: list[str]) -> int:
     given, running = chosen(options, Settings), _running_of(options)
     also_read = [given[name] for name in ("start", "weights") if name in given]
     jobs = plan(sources_of(options.inputs, running.recursive), places, also_read, running.force)
+    check_streams(jobs, running)
     work = Work(given, _export_options(options, places.targets), running)
     _check_settings(work, places)
     batch = Batch(jobs, work, Report(running.report, running.force))
