@@ -12,12 +12,13 @@ from typing import Any
 
 from . import guard
 from .converting import Done, Work, convert
+from .errors import Sdf2vecError
 from .files import one_line
 from .guard import Problem
 from .outputs import STREAM, Job
 from .progress import Stop, Teller, telling
 from .report import BUG, FAILED, MISSED, OK, SKIPPED, STOPPED, Report, Row
-from .running import PROCESSES
+from .running import PROCESSES, Running
 from .sources import version_of, whole
 from .workers import Workers, working
 
@@ -92,13 +93,23 @@ class Batch:
         return [job.source for job in self.jobs if job.source not in self.rows]
 
 
+def check_streams(jobs: Sequence[Job], running: Running) -> None:
+    """Raises Sdf2vecError where workers would have to read standard input or write standard output."""
+    if not _is_alone(running, len(jobs)) and any(STREAM in (j.source, *j.outputs.values()) for j in jobs):
+        raise Sdf2vecError("standard input and output belong to this process; workers take files and URLs")
+
+
+def _is_alone(running: Running, pictures: int) -> bool:
+    """Whether this process converts the pictures itself."""
+    return running.engine == PROCESSES and min(running.jobs or 1, pictures) == 1
+
+
 def run_batch(batch: Batch, stop: Stop) -> None:
     """Converts what is to be done, until a stop is asked for."""
     todo = batch.todo()
     running = batch.work.running
-    is_alone = running.engine == PROCESSES and min(running.jobs or 1, len(todo)) == 1
     try:
-        if is_alone:
+        if _is_alone(running, len(todo)):
             _one_by_one(batch, todo, stop)
         elif todo:
             _beside_each_other(batch, todo, stop)

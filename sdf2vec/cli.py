@@ -13,8 +13,8 @@ from typing import TYPE_CHECKING, Literal, NoReturn
 
 from msgspec.structs import replace
 
-from . import __version__, cached, completing, guard
-from .batch import Batch, about, about_left, exit_status, run_batch
+from . import __version__, cached, completing, guard, warming
+from .batch import Batch, about, about_left, check_streams, exit_status, run_batch
 from .checkpoint import OFF
 from .converting import Work, write_exports
 from .declared import add_flags, checked, chosen, options_of
@@ -53,6 +53,7 @@ OF_FITS = (
     "report",
     "checkpoint",
 )  # what only fits heed of a run
+WARM_UP = "--warm-up"
 DIFFERS = 1  # exit status of a check
 
 
@@ -83,8 +84,9 @@ def _convert_parser() -> argparse.ArgumentParser:
         usage="sdf2vec INPUT... [--emit TARGETS] [-o OUT] [options]",
         description="Fits a few soft geometric shapes to pictures and exports them as mathematics.",
         epilog="Other commands, each with its own --help: sdf2vec check | render | export | cache | completion. "
-        "--traceback shows where an error that is a bug came from. Exit status: 0; 2 for what you can mend, 3 where "
-        "only some pictures failed, 4 where a target was not reached (the nearest is written), 70 for a bug.",
+        "--warm-up compiles all that fits may need. --traceback shows where an error that is a bug came from. "
+        "Exit status: 0; 2 for what you can mend, 3 where only some pictures failed, 4 where a target was not reached "
+        "(the nearest is written), 70 for a bug.",
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
     parser.add_argument(
@@ -156,6 +158,7 @@ def _convert(arguments: list[str]) -> int:
     also_read = [given[name] for name in ("start", "weights") if name in given]
     sources = sources_of(options.inputs, running.recursive)
     jobs = plan(sources, places, also_read, running.force, running.checkpoint)
+    check_streams(jobs, running)
     work = Work(given, _export_options(options, places.targets), running)
     _check_settings(work, places)
     batch = Batch(jobs, work, Report(running.report, running.force))
@@ -286,6 +289,11 @@ def _cache_command(arguments: list[str]) -> int:
     return cached.command(_cache_parser().parse_args(arguments))
 
 
+def _warm_up_command(arguments: list[str]) -> int:
+    about = "Compiles the kernels of every kind of shape, so that no fit has to: some minutes, once."
+    return warming.command(_Parser(prog="sdf2vec --warm-up", description=about), arguments)
+
+
 def _completion_parser() -> argparse.ArgumentParser:
     parser = _Parser(
         prog="sdf2vec completion",
@@ -361,6 +369,7 @@ COMMANDS: dict[str, Callable[[list[str]], int]] = {
     "export": _export_command,
     "cache": _cache_command,
     "completion": _completion_command,
+    WARM_UP: _warm_up_command,
 }
 
 if __name__ == "__main__":

@@ -35,6 +35,8 @@ if TYPE_CHECKING:
 
 load_picture: Callable[[Any], Picture] = deferred("sdf2vec.image", "load")
 encode_png: Callable[[Any], bytes] = deferred("sdf2vec.image", "encode_png")
+is_lettering: Callable[[Any], bool] = deferred("sdf2vec.lettering", "is_lettering")
+HINT = "this looks like text: outlines serve it better (vtracer, potrace)"
 quality_of: Callable[[Scene, Picture], Quality] = deferred("sdf2vec.quality", "quality")
 figure: Callable[..., Check | None] = deferred("sdf2vec.roundtrip", "figure")
 
@@ -86,6 +88,8 @@ def convert(job: Job, work: Work, teller: Teller, stop: Stop) -> Done:
     )
     if fitted.reason:
         teller.say(f"  {fitted.reason}")
+    if is_lettering(picture.pixels):
+        teller.say(f"  {HINT}")
     original = _original(data(), picture) if work.running.with_original else None
     written = write_exports(scene, job, replace(work.export, original=original), teller)
     checkpoint.remove()

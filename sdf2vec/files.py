@@ -49,14 +49,19 @@ def write_atomically(path: str | os.PathLike[str], data: bytes) -> None:
         raise _refusal(path, error) from error
 
 
-def require_writable(path: str | os.PathLike[str]) -> None:
-    """Raises Sdf2vecError where `write_atomically` is bound to fail: before hours of work. Leaves nothing behind."""
+def require_writable(path: str | os.PathLike[str], tried: set[Path] | None = None) -> None:
+    """Raises Sdf2vecError where `write_atomically` is bound to fail: before hours of work. Leaves nothing behind.
+
+    `tried`: folders that need not be tried again; this one comes to them.
+    """
     try:
         target = Path(os.path.realpath(path))
         if target.is_dir():
             raise IsADirectoryError
-        if not target.exists() or target.is_file():
+        if (not target.exists() or target.is_file()) and target.parent not in (tried or ()):
             _require_folder(target.parent)
+        if tried is not None:
+            tried.add(target.parent)
     except (OSError, ValueError) as error:
         raise _refusal(path, error) from error
 

@@ -206,10 +206,12 @@ def plan(
     jobs = [Job(source, made, _checkpoint(made, checkpoint)) for source, made in outputs.items()]
     read = {str(Path(path).resolve()) for path in (*sources, *also_read) if path != STREAM}
     taken: dict[str, str] = {}
+    tried: set[Path] = set()
     for job in jobs:
         for target, path in job.outputs.items():
             if path != STREAM:
                 _claim(path, job.source, taken, read)
+                require_writable(path, tried)
                 if not force:
                     _refuse_foreign(path, EXPORTERS[target])
         if job.checkpoint:
@@ -236,7 +238,6 @@ def _claim(path: str, source: str, taken: dict[str, str], read: set[str]) -> Non
         both = f"both {one_line(taken[resolved])} and {one_line(source)}"
         raise Sdf2vecError(f"{one_line(path)}: {both} would be written there; convert them apart")
     taken[resolved] = source
-    require_writable(path)
 
 
 def _refuse_foreign(path: str, exporter: Exporter) -> None:

@@ -25,6 +25,9 @@ TextColumn = deferred("rich.progress", "TextColumn")
 TimeRemainingColumn = deferred("rich.progress", "TimeRemainingColumn")
 
 
+COMPILING = "compiling"  # in the name of a phase
+
+
 @dataclass
 class Teller:
     """Says what happens: lines on standard output (on stderr where that carries an export), a bar on a terminal."""
@@ -92,8 +95,12 @@ class Teller:
             )
 
     def step(self, progress: Progress) -> None:
-        """Shows where a fit stands."""
+        """Shows where a fit stands; where there is no bar, a line says why nothing seems to happen."""
         if not self.bar:
+            if COMPILING in progress.phase:
+                self.say(
+                    f"  {progress.phase}: takes some seconds more; sdf2vec --warm-up does all of it beforehand"
+                )
             return
         counted = f"step {progress.step}/{progress.steps}"
         loss = f"  loss {progress.loss:.5f}" if math.isfinite(progress.loss) else ""

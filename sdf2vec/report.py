@@ -10,7 +10,7 @@ import os
 import time
 from collections import Counter
 from collections.abc import Callable
-from dataclasses import asdict, dataclass, fields
+from dataclasses import dataclass, fields
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -87,7 +87,7 @@ class Report:
         if self.path is None:
             return
         started = time.monotonic()
-        write_atomically(self.path, self.form.write([asdict(row) for row in self.rows.values()]))
+        write_atomically(self.path, self.form.write([vars(row) for row in self.rows.values()]))
         write_atomically(self.sums, json.dumps(self._sums(), indent=1).encode())
         ended = time.monotonic()
         self.next = ended + max(EVERY, WORTH * (ended - started))

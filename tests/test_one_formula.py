@@ -14,7 +14,11 @@ from sdf2vec import blend
 from sdf2vec.templating import template
 
 PACKAGE = Path(sdf2vec.__file__).parent
-TEMPLATES = sorted(Path(str(template("glsl.jinja").filename)).parent.glob("*.jinja"))
+TEMPLATES = sorted(
+    path
+    for path in Path(str(template("glsl.jinja").filename)).parent.glob("*.jinja")
+    if not path.name.startswith("completion.")  # scripts of shells
+)
 
 # --- templates -----------------------------------------------------------------------------------------------
 

@@ -165,10 +165,10 @@ def test_check_converts_an_additive_scene_once(require_engine, monkeypatch):
         return replace(scene, layers=(), compositing="over"), 12.0
 
     monkeypatch.setattr(exports, "_over_of", over_of)
-    for name in ("chromium", "firefox", "image", "cairosvg"):
+    for name in ("chromium", "firefox", "image", "cairosvg", "inkscape"):
         monkeypatch.setitem(ENGINES, name, absent(name))
     results = [r for r in sdf2vec.check(scene, ["svg", "data-uri", "pdf"], [(60, 40)]) if not r.missing]
-    assert len(results) == 6
+    assert len(results) == 7  # one more by resvg: the profile for Inkscape
     assert fits == [scene]
 
 

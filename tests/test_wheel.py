@@ -61,6 +61,7 @@ def fresh(wheel, tmp_path_factory):
 
 def test_wheel_holds_the_package_and_its_templates(wheel):
     names = set(zipfile.ZipFile(wheel).namelist())
+    assert "sdf2vec/py.typed" in names
     templates = CHECKOUT / "templates"
     expected = {
         f"sdf2vec/templates/{path.relative_to(templates).as_posix()}"

@@ -46,6 +46,7 @@ class Dask:
                 dashboard_address=None,
                 silence_logs=logging.CRITICAL,
                 env=environment,
+                preload=["sdf2vec.workers.dask_worker"],
             )
 
     def _connected(self, where: Any) -> Any:

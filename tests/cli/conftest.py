@@ -12,8 +12,8 @@ from tests.cli.command import ALL, SHORT, Outcome, picture
 
 
 @pytest.fixture(autouse=True)
-def short_fits(monkeypatch):
-    """Three steps a phase: what is tested here is not the fit."""
+def short_fits(monkeypatch, kernels_there):
+    """Three steps a phase: what is tested here is not the fit. No line says that kernels are compiled."""
     short = tuple(replace(phase, steps=3) for phase in PRESETS["fast"].phases)
     monkeypatch.setitem(PRESETS, "fast", replace(PRESETS["fast"], phases=short))
 

@@ -4,11 +4,14 @@ import io
 import math
 import re
 import sys
+from importlib import import_module
 
-from sdf2vec import Scene
+from sdf2vec import Scene, warming, workers
 from sdf2vec.fit.loop import Progress
 from sdf2vec.progress import telling
 from sdf2vec.running import Running
+from sdf2vec.shapes import KINDS
+from tests.cli.command import SHORT
 
 
 def scene():
@@ -52,3 +55,41 @@ def test_a_quiet_run_has_no_bar(monkeypatch, capsys):
         teller.say("nothing")
         teller.step(Progress("coarse", 7, 90, 0.25, scene))
     assert stream.getvalue() + capsys.readouterr().out == ""
+
+
+def test_without_a_terminal_a_line_says_that_kernels_are_compiled(folder, run, monkeypatch):
+    monkeypatch.setattr(import_module("sdf2vec.render.kernels"), "is_compiled", lambda *arguments: False)
+    said = b"compiling kernels (once): takes some seconds more"
+    assert run("photo.jpg", *SHORT, "-o", "a.json").out.count(said) == 1
+    assert said not in run("photo.jpg", *SHORT, "-o", "a.json", "-q").out
+
+
+def test_warming_up_fits_every_kind(folder, run, monkeypatch):
+    """In processes, which are none here."""
+    seen: list[tuple[str, str]] = []
+
+    class Here:
+        capacity = 2
+
+        def __init__(self):
+            self.under_way = []
+
+        def start(self, task, *arguments):
+            assert task is warming.warm
+            seen.append(arguments)
+            self.under_way.append((arguments, 1.5))
+            return arguments
+
+        def ended(self, seconds):
+            ended, self.under_way = self.under_way, []
+            return ended
+
+        def close(self):
+            pass
+
+    monkeypatch.setitem(workers._WORKERS, "processes", lambda *_: Here())
+    lines = run("--warm-up").out.decode().splitlines()
+    assert {("circle", "over"), ("gabor", "additive"), ("mixed", "over")} <= set(seen)
+    assert len(lines) == len(seen) == 2 * (len(KINDS) + 1)
+    assert "circle, over: 1.5 s" in lines[0]
+    assert warming.warm("circle", "over") > 0

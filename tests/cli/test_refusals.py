@@ -65,7 +65,7 @@ from tests.cli.command import SHORT, as_png, assert_refused, names, picture
         (["folders"], ["folders: is a folder without pictures", ".webp", "--recursive"]),
         (["*.gif"], ["*.gif: no such file"]),
         (["photo.jpg", "--jobs", "0"], ["number of processes", "got 0"]),
-        (["photo.jpg", "--report", "r.txt"], ["r.txt", ".jsonl or .csv"]),
+        (["photo.jpg", "--report", "r.txt"], ["r.txt", ".jsonl, .csv, .parquet"]),
         (["photo.jpg", "--report", "bad.csv"], ["bad.csv", "no report of sdf2vec", "--force"]),
         (["photo.jpg", "--report", "bad.jsonl"], ["bad.jsonl", "no report of sdf2vec"]),
         (["text.png"], ["text.png", "not a picture"]),

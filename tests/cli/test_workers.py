@@ -153,6 +153,8 @@ def test_what_is_missing_is_said_in_a_line(folder, run, monkeypatch, options, wo
         (["--address", "tcp://here:8786"], ["--address has no effect on processes"]),
         (["--shard", "3"], ["--shard has no effect on one process"]),
         (["-q", "-v"], ["either -q or -v"]),
+        (["--engine", "dask", "-o", "-"], ["standard input and output belong to this process"]),
+        (["-", "--jobs", "2"], ["standard input and output belong to this process"]),
         (["--engine", "spark"], ["unknown engine 'spark'; choose from processes, dask, ray"]),
         (["--engine", "dask", "--address", "here"], ["--address here: no Dask scheduler answers"]),
         (["--report", "r.txt"], ["r.txt: a report ends in .jsonl, .csv, .parquet"]),
