@@ -29,6 +29,13 @@ def test_a_half_transparent_picture_is_its_ground():
     assert scene.ground == pytest.approx((128 / 255 * 128 / 255,) * 3 + (128 / 255,), abs=1e-3)
 
 
+@pytest.mark.parametrize("level", [0, 3, 128, 255])
+def test_one_pixel_of_any_alpha(level):
+    """Where shapes could not be fainter than their least opacity."""
+    pixels = np.array([[[200, 100, 50, level]]], np.uint8)
+    assert psnr_of(sdf2vec.fit(pixels, 5, preset="fast"), load(pixels)) > 60
+
+
 def test_a_picture_with_holes_has_no_ground():
     """What is laid over a ground could not take its alpha away."""
     holes = torch.ones(4, 10, 10)
