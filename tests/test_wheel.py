@@ -57,10 +57,10 @@ def test_the_lock_holds_all_dependencies_by_their_hashes():
     """What pyproject.toml asks for, the tests' own packages too; each file by its hash, from no place in particular."""
     text = (CHECKOUT / "requirements.lock").read_text()
     assert "http" not in text
-    locked = {}
+    locked: dict[str, list[str]] = {}
     for entry in re.split(r"\n(?=\S)", text):
         assert "--hash=sha256:" in entry
-        name, version = re.match(r"([\w.-]+)==([\w.+-]+)", entry).groups()
+        ((name, version),) = re.findall(r"^([\w.-]+)==([\w.+-]+)", entry)
         locked.setdefault(name.replace("_", "-"), []).append(version)
     project = tomllib.loads((CHECKOUT / "pyproject.toml").read_text())["project"]
     wanted = [

@@ -5,7 +5,7 @@ import os
 import pytest
 
 import sdf2vec
-from sdf2vec import checkpoint, converting
+from sdf2vec import checkpoint
 from tests.cli.command import SHORT, assert_refused, names
 
 JSON = (*SHORT, "--emit", "json")
@@ -90,7 +90,11 @@ def test_a_checkpoint_replaces_nothing_of_others(folder, run):
 
 
 def test_a_callback_may_take_the_scene(folder):
-    seen = []
-    sdf2vec.fit("photo.jpg", 5, preset="fast", callback=lambda p: seen.append(p.scene()) or len(seen) > 2)
+    seen: list[sdf2vec.Scene] = []
+
+    def take(progress):
+        seen.append(progress.scene())
+        return len(seen) > 2
+
+    sdf2vec.fit("photo.jpg", 5, preset="fast", callback=take)
     assert [scene.shape_count for scene in seen] == [5, 5, 5]
-    assert converting.Checkpoint("").begin(None) == ""

@@ -3,6 +3,7 @@
 import os
 import subprocess
 import sys
+from typing import Any
 
 import numpy as np
 import pytest
@@ -12,7 +13,10 @@ import sdf2vec
 NOISE = np.random.default_rng(0).integers(0, 256, (33, 47, 3), dtype=np.uint8)
 SQUARE = np.full((24, 24, 3), 255, np.uint8)
 SQUARE[5:14, 8:20] = (200, 0, 0)
-PICTURES = {"painted": (NOISE, {"shapes": 9, "kind": "circle"}), "drawn": (SQUARE, {"max_shapes": 1})}
+PICTURES: dict[str, tuple[np.ndarray, dict[str, Any]]] = {
+    "painted": (NOISE, {"shapes": 9, "kind": "circle"}),
+    "drawn": (SQUARE, {"max_shapes": 1}),
+}
 
 
 def made(name):
