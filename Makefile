@@ -22,7 +22,7 @@ ENGINES := libegl1 libegl-mesa0 libgl1 libgl1-mesa-dri libgbm1 libgles2 mesa-vul
            glslang-tools libcairo2 librsvg2-bin inkscape chromium firefox-esr $(if $(shell command -v npm),,npm)
 
 .DEFAULT_GOAL := demo
-.PHONY: demo test bench lint format engines clean distclean
+.PHONY: demo test bench lint format lock locked engines clean distclean
 
 demo: $(VENV)/.installed
 	$(BIN)/sdf2vec examples/coffee.png --shapes 64 --seed 0 --emit json,glsl,shadertoy,wgsl,svg,png -o out/demo
@@ -42,6 +42,18 @@ format: $(VENV)/.installed-test
 # Speed: the tables of docs/speed.md, on this machine; some minutes.
 bench: $(VENV)/.installed-test
 	$(BIN)/python -m sdf2vec.bench.speed -o docs/speed.md
+
+# What the tests were run with, each file by its hash; `lock` finds it out anew (with uv), `locked` installs it.
+lock: $(VENV)/.torch
+	$(PIP) install uv
+	echo "$(TORCH)" > $(VENV)/torch.txt
+	$(BIN)/uv pip compile pyproject.toml --extra test --constraint $(VENV)/torch.txt --universal --python-version 3.11 \
+	  --generate-hashes --no-emit-index-url --no-annotate --no-header --quiet --output-file requirements.lock
+
+locked:
+	$(PYTHON) -m venv $(VENV)
+	$(PIP) install --require-hashes -r requirements.lock
+	$(PIP) install --no-deps --no-build-isolation -e .
 
 # Without them the tests that draw on real engines are skipped and say so; where CI is set they fail.
 engines:

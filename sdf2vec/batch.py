@@ -191,7 +191,8 @@ def _sent(shard: Shard, work: Work, is_elsewhere: bool) -> tuple[Shard, Work, bo
 
 def _placed(job: Job) -> Job:
     outputs = {target: whole(path) for target, path in job.outputs.items()}
-    return replace(job, source=whole(job.source), outputs=outputs)
+    checkpoint = job.checkpoint and whole(job.checkpoint)
+    return replace(job, source=whole(job.source), outputs=outputs, checkpoint=checkpoint)
 
 
 def _converted(shard: Shard, work: Work, show: bool) -> list[Result]:

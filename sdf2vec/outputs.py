@@ -217,6 +217,7 @@ def plan(
         if job.checkpoint:
             going_on = {str(Path(path).resolve()) for path in also_read}  # from it
             _claim(job.checkpoint, job.source, taken, read - going_on)
+            require_writable(job.checkpoint, tried)
             if not force:
                 _refuse_foreign(job.checkpoint, EXPORTERS["json"])
     return jobs

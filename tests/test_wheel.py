@@ -2,14 +2,17 @@
 
 import json
 import os
+import re
 import subprocess
 import sys
 import sysconfig
+import tomllib
 import zipfile
 from importlib.util import find_spec
 from pathlib import Path
 
 import pytest
+from packaging.requirements import Requirement
 from PIL import Image
 
 CHECKOUT = Path(__file__).parent.parent
@@ -39,6 +42,48 @@ def wheel(tmp_path_factory):
     _run(sys.executable, "-m", "build", "--wheel", *isolation, "--outdir", folder, CHECKOUT, folder=folder)
     (built,) = folder.glob("*.whl")
     return built
+
+
+@pytest.mark.parametrize(
+    "checked", [("twine", "check", "--strict"), ("check_wheel_contents",)], ids=lambda c: c[0]
+)
+def test_wheel_is_fit_to_be_published(wheel, checked):
+    if not find_spec(checked[0]):
+        pytest.skip(f"{checked[0]} is not installed")
+    _run(sys.executable, "-m", *checked, wheel, folder=CHECKOUT)
+
+
+def test_the_lock_holds_all_dependencies_by_their_hashes():
+    """What pyproject.toml asks for, the tests' own packages too; each file by its hash, from no place in particular."""
+    text = (CHECKOUT / "requirements.lock").read_text()
+    assert "http" not in text
+    locked: dict[str, list[str]] = {}
+    for entry in re.split(r"\n(?=\S)", text):
+        assert "--hash=sha256:" in entry
+        ((name, version),) = re.findall(r"^([\w.-]+)==([\w.+-]+)", entry)
+        locked.setdefault(name.replace("_", "-"), []).append(version)
+    project = tomllib.loads((CHECKOUT / "pyproject.toml").read_text())["project"]
+    wanted = [
+        *project["dependencies"],
+        *(d for extra in project["optional-dependencies"].values() for d in extra),
+    ]
+    asked = [Requirement(text) for text in wanted if not text.startswith("sdf2vec[")]
+    assert len(asked) > 25
+    for requirement in asked:
+        name = requirement.name.replace("_", "-")
+        assert any(requirement.specifier.contains(version) for version in locked[name]), requirement
+
+
+def test_the_licences_of_all_dependencies_are_told():
+    told = (CHECKOUT / "docs" / "licences.md").read_text()
+    project = tomllib.loads((CHECKOUT / "pyproject.toml").read_text())["project"]
+    for text in project["dependencies"]:
+        assert f"| {Requirement(text).name} |" in told
+    assert "LGPL-3.0-or-later" in told
+
+
+def test_the_package_is_typed(wheel):
+    assert "sdf2vec/py.typed" in zipfile.ZipFile(wheel).namelist()
 
 
 @pytest.fixture(scope="module")

@@ -241,7 +241,10 @@ class Fit:
         Where the shapes stay the same, it ends with the best state seen.
         """
         phase = stage.phase
-        best = Best(self.tensors) if phase.growth is None and phase.relocation is None else None
+        best = None
+        if phase.growth is None and phase.relocation is None:
+            project(self.tensors, self.pixel, self.preset.falloff)  # a start may be out of range
+            best = Best(self.tensors)
         try:
             self._take_steps(stage, moves, best)
         finally:  # also when stopped

@@ -90,12 +90,11 @@ def test_a_checkpoint_replaces_nothing_of_others(folder, run):
 
 
 def test_a_callback_may_take_the_scene(folder):
-    seen = []
+    seen: list[sdf2vec.Scene] = []
 
-    def callback(progress):
+    def take(progress):
         seen.append(progress.scene())
         return len(seen) > 2
 
-    sdf2vec.fit("photo.jpg", 5, preset="fast", callback=callback)
+    sdf2vec.fit("photo.jpg", 5, preset="fast", callback=take)
     assert [scene.shape_count for scene in seen] == [5, 5, 5]
-    assert checkpoint.Checkpoint("").begin(None) == ""

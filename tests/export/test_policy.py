@@ -27,6 +27,12 @@ IN_ELEMENT = (
 )
 
 
+def text_of(target, **options):
+    text = sdf2vec.export(SCENE, target, **options)
+    assert isinstance(text, str)
+    return text
+
+
 def digest(text):
     return f"'sha256-{base64.b64encode(hashlib.sha256(text.encode()).digest()).decode()}'"
 
@@ -39,7 +45,7 @@ def red_in_the_middle(page, selector):
 
 def test_a_page_with_hostile_words_works_under_its_own_policy(require_engine):
     require_engine("chromium")
-    text = str(sdf2vec.export(SCENE, "html", title=HOSTILE, alt=HOSTILE))
+    text = text_of("html", title=HOSTILE, alt=HOSTILE)
     (policy,) = re.findall(r'http-equiv="Content-Security-Policy" content="([^"]*)"', text)
     assert policy.startswith("default-src 'none'")
     assert "unsafe" not in policy
@@ -58,7 +64,7 @@ def test_a_page_with_hostile_words_works_under_its_own_policy(require_engine):
 def test_a_script_that_got_into_a_page_would_not_run(require_engine):
     """Even so: the policy is what forbids it."""
     require_engine("chromium")
-    text = str(sdf2vec.export(SCENE, "html")).replace("</main>", f"<script>{RUN}</script></main>")
+    text = text_of("html").replace("</main>", f"<script>{RUN}</script></main>")
     with chromium.opened({"index.html": text}, 200, 300) as page:
         page.wait_for_timeout(200)
         assert page.evaluate("window.ran") is None
@@ -67,7 +73,7 @@ def test_a_script_that_got_into_a_page_would_not_run(require_engine):
 def test_the_element_works_under_a_strict_policy(require_engine):
     """Its module by its hash, the scene from the page's own place; no style has to be allowed."""
     require_engine("chromium")
-    module = sdf2vec.export(SCENE, "component")
+    module = text_of("component")
     policy = f"default-src 'none'; script-src {digest(module)}; connect-src 'self'"
     page = (
         f'<!DOCTYPE html><meta http-equiv="Content-Security-Policy" content="{policy}">'
@@ -91,10 +97,10 @@ def test_the_element_works_under_a_strict_policy(require_engine):
 def test_drawings_with_hostile_words_run_nothing(target, profile, require_engine):
     """As a document of its own, where scripts would run; and as a picture in a page."""
     require_engine("chromium")
-    drawing = str(sdf2vec.export(SCENE, "svg", title=HOSTILE, alt=HOSTILE, svg_profile=profile))
+    drawing = text_of("svg", title=HOSTILE, alt=HOSTILE, svg_profile=profile)
     page = drawing[drawing.index("<svg") :] if target == "svg" else "<!DOCTYPE html>"
     if target == "data-uri":
-        address = str(sdf2vec.export(SCENE, target, title=HOSTILE, alt=HOSTILE, svg_profile=profile))
+        address = text_of(target, title=HOSTILE, alt=HOSTILE, svg_profile=profile)
         page += f'<img src="{escape(address)}" width="60" height="40">'
     with chromium.opened({"index.html": page}, 60, 40) as shown:
         shown.wait_for_timeout(100)
@@ -105,7 +111,7 @@ def test_drawings_with_hostile_words_run_nothing(target, profile, require_engine
 @pytest.mark.parametrize("target", ["three", "component"])
 def test_modules_with_hostile_words_run_nothing(target, require_engine):
     require_engine("chromium")
-    module = sdf2vec.export(SCENE, target, title=HOSTILE)
+    module = text_of(target, title=HOSTILE)
     page = '<!DOCTYPE html><script type="module" src="it.js"></script>'
     said: list[str] = []
     with chromium.opened({"index.html": page, "it.js": module}, 60, 40) as shown:
@@ -122,7 +128,8 @@ def test_modules_with_hostile_words_run_nothing(target, require_engine):
 def test_no_other_target_holds_what_ends_a_comment_or_a_line(target):
     """The title of a shader is one line of a comment, that of a picture is in none."""
     titled = "title" in EXPORTERS[target].heeds
-    raw = (sdf2vec.exported(SCENE, target, title=HOSTILE) if titled else sdf2vec.exported(SCENE, target)).raw
+    made = sdf2vec.exported(SCENE, target, title=HOSTILE) if titled else sdf2vec.exported(SCENE, target)
+    raw = made.raw
     if target in ("png", "jpg", "webp"):
         assert RUN.encode() not in raw
         return

@@ -10,6 +10,7 @@ import sdf2vec
 from sdf2vec import Layer, Scene, Shape
 from sdf2vec.fit import loop
 from sdf2vec.fit.best import Best, faded, nearest_of_its_own
+from sdf2vec.fit.constraints import project
 from sdf2vec.fit.initialization import background_of
 from sdf2vec.image import Picture, load
 from sdf2vec.quality import psnr_of
@@ -27,6 +28,13 @@ def test_a_half_transparent_picture_is_its_ground():
     scene = sdf2vec.fit(pixels, 5, preset="fast")
     assert psnr_of(scene, load(pixels)) > 60
     assert scene.ground == pytest.approx((128 / 255 * 128 / 255,) * 3 + (128 / 255,), abs=1e-3)
+
+
+@pytest.mark.parametrize("level", [0, 3, 128, 255])
+def test_one_pixel_of_any_alpha(level):
+    """Where shapes could not be fainter than their least opacity."""
+    pixels = np.array([[[200, 100, 50, level]]], np.uint8)
+    assert psnr_of(sdf2vec.fit(pixels, 5, preset="fast"), load(pixels)) > 60
 
 
 def test_a_picture_with_holes_has_no_ground():
@@ -104,3 +112,10 @@ def test_a_ground_of_few_colors_is_one_of_them():
     green = replace(RED_DISC, shapes=(Shape.of("circle", (0, 1, 0), center=(0, 0), radius=0.1),))
     tensors = from_scene(Scene(8, 8, (RED_DISC, green), GREY))
     assert nearest_of_its_own(tensors, torch.tensor([0.4, 0.1, 0.1, 0.5])).tolist() == [0.5, 0, 0, 0.5]
+
+
+def test_a_ground_stays_premultiplied():
+    tensors = from_scene(Scene(8, 8, (RED_DISC,), (*GREY, 0.4)))
+    tensors.background[:3] = torch.tensor([0.9, 0.3, -0.1])
+    project(tensors, 0.1)
+    assert tensors.background.tolist() == pytest.approx([0.4, 0.3, 0.0, 0.4])

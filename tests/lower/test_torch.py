@@ -28,7 +28,7 @@ def test_torch(name, dtype, tolerance):
 
 def test_torch_source_is_one_assignment_per_node():
     assert source([(a + b) * (a + b)], [a, b]) == (
-        "def lowered(a, b):\n    t1 = a + b\n    t2 = t1 * t1\n    return (t2,)\n"
+        "def lowered(a, b):\n    t1 = a + b\n    t2 = t1 * t1; del t1\n    return (t2,)\n"
     )
 
 
