@@ -4,16 +4,18 @@ from __future__ import annotations
 
 import argparse
 import shlex
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
+from typing import Any
 
 from .declared import Option, check_choice, options_of
+from .deferred import deferred
 from .export import EXPORTERS
 from .export.options import Options
 from .fit.settings import Settings
 from .running import Running
-from .templating import template
 
+template: Callable[..., Any] = deferred("sdf2vec.templating", "template")  # jinja2
 SHELLS = ("bash", "zsh", "fish")
 FILES = ("OUT", "FILE", "SCENE", "MASK")  # what stands for a path in a flag's help
 SEVERAL = ("emit", "kind", "loss")  # take several values, separated by commas
