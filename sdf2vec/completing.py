@@ -65,7 +65,7 @@ def script(shell: str, parsers: Mapping[str, argparse.ArgumentParser]) -> str:
     check_choice("shell", shell, SHELLS)
     flags = {command: list(_flags_of(parser)) for command, parser in parsers.items()}
     flags[""].append(Flag(("--warm-up",), "compile all that fits may need", False, (), False, False))
-    return template(f"completion.{shell}.jinja").render(
+    script: str = template(f"completion.{shell}.jinja").render(
         flags=flags,
         commands=[name for name in parsers if name],
         abouts={
@@ -73,6 +73,7 @@ def script(shell: str, parsers: Mapping[str, argparse.ArgumentParser]) -> str:
         },
         shells=SHELLS,
     )
+    return script
 
 
 def _flags_of(parser: argparse.ArgumentParser) -> Iterable[Flag]:
