@@ -15,10 +15,12 @@ import numpy as np
 import torch
 from msgspec import structs
 
+from ..blend import COMPOSITING
 from ..image import Picture
 from ..paints import FLAT as ONE_COLOR
 from ..quality import psnr_of, quality
-from ..render.tensors import SceneTensors, to_scene
+from ..render import fused
+from ..render.tensors import SceneTensors, from_scene, to_scene
 from ..scene import Scene
 from ..threads import threads_of_its_own
 from .backends import CPU, choose
@@ -26,11 +28,12 @@ from .byte_budget import Share, within
 from .initialization import Layers, background_of, empty_groups
 from .joining import Search
 from .loop import Callback, Progress, Stopped, fit_picture, scaled, view_of
-from .matching_pursuit import Painted, find_discs
+from .matching_pursuit import Missing, Painted, find_discs
 from .offers import common_color
 from .settings import AUTO, Settings, preset_of
 from .simplify import simplified
 from .sparse import FLOOR, Round, Sizes, error_of, finished, grow, needed, pruned
+from .surroundings import View
 
 SEARCH, JOINT, LAST = 56, 128, 320  # pixels squared
 FEW = 4  # shapes that are placed by trial, also where their number is given
@@ -70,9 +73,29 @@ def fitted_picture(
     """
     choose(settings.device)  # drawings are searched on the CPU, but what is asked for must be there
     with threads_of_its_own():
-        if share is None or settings.shapes != AUTO:
+        if settings.shapes != AUTO:
             return _few(picture, settings, callback) or _painted(picture, settings, callback)
-        return _within(picture, settings, callback, share)
+        if share is None:
+            found = _few(picture, settings, callback) or _painted(picture, settings, callback)
+        else:
+            found = _within(picture, settings, callback, share)
+        gain = gain_of_one_more(found.scene, view_of(picture.premultiplied, settings, JOINT))
+        return replace(found, reason=f"{found.reason}; one more would gain {gain:.2f} dB")
+
+
+def gain_of_one_more(scene: Scene, view: View) -> float:
+    """What the best soft disc on top, or added, takes from the error of a scene's render, in dB."""
+    channels, height, width = view.target.shape
+    image = fused.composite(from_scene(scene), width, height, channels)
+    weights = torch.ones(height, width) if view.weights is None else view.weights
+    is_added = COMPOSITING[scene.compositing].signed
+    canvas = (
+        Missing(view.target - image, weights) if is_added else Painted(image.clone(), view.target, weights)
+    )
+    find_discs(canvas, 1)
+    left = canvas.residual if isinstance(canvas, Missing) else view.target - canvas.image
+    before, after = ((wrong * weights).square().mean() for wrong in (view.target - image, left))
+    return max(0.0, 10.0 * math.log10(float(before / after))) if after > 0 else 0.0
 
 
 def _within(picture: Picture, settings: Settings, callback: Callback, share: Share) -> Fitted:

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterator
+from dataclasses import dataclass
 from functools import cache
 
 import torch
@@ -36,42 +37,41 @@ Propose = Callable[[Group, View], Iterator[Change]]
 
 def simplified(scene: SceneTensors, view: View, search: Search, worst: float) -> SceneTensors:
     """The scene with simpler layers, while its mean squared error hardly rises or stays below the worst."""
-    limit = max(worst, RISE * error_of(scene, view))
+    trial = Trial(view, search, max(worst, RISE * error_of(scene, view)))
     for order in range(scene.layer_count):
         kept: tuple[Slot, ...] = ()
         for change in CHANGES:
-            while (made := _changed(scene, order, change, kept, view, search, limit)) is not None:
+            while (made := trial.changed(scene, order, change, kept)) is not None:
                 scene, still = made
                 kept = (*kept, *still)
     return scene
 
 
-def _changed(
-    scene: SceneTensors,
-    order: int,
-    change: Propose,
-    kept: tuple[Slot, ...],
-    view: View,
-    search: Search,
-    limit: float,
-) -> tuple[SceneTensors, tuple[Slot, ...]] | None:
-    """The scene after the first change of a layer that is no worse than the limit, and what must stay since then."""
-    for layer, still in change(layer_at(scene, order), view):
-        is_new = not still or not set(still).issubset(kept)
-        if is_new and set(search.layers.kinds).issuperset(part.kind for part in layer.structure):
-            tried = _tried(scene, layer, (*kept, *still), view, search)
-            if error_of(tried, view) <= limit:
-                return tried, still
-    return None
+@dataclass(frozen=True)
+class Trial:
+    """Changes are tried on a picture, and kept up to a mean squared error."""
 
+    view: View
+    search: Search
+    limit: float
 
-def _tried(
-    scene: SceneTensors, layer: Group, still: tuple[Slot, ...], view: View, search: Search
-) -> SceneTensors:
-    """The scene with a layer whose other numbers have moved a little."""
-    around = Surroundings.of(scene, int(layer.order), view)
-    tried = search.trained(layer, around, STEPS, lambda slot: slot not in still)
-    return inserted(scene, tried.layer)
+    def changed(
+        self, scene: SceneTensors, order: int, change: Propose, kept: tuple[Slot, ...]
+    ) -> tuple[SceneTensors, tuple[Slot, ...]] | None:
+        """The scene after the first change of a layer that is good enough, and what must stay since then."""
+        for layer, still in change(layer_at(scene, order), self.view):
+            is_new = not still or not set(still).issubset(kept)
+            if is_new and {part.kind for part in layer.structure}.issubset(self.search.layers.kinds):
+                tried = self._moved(scene, layer, (*kept, *still))
+                if error_of(tried, self.view) <= self.limit:
+                    return tried, still
+        return None
+
+    def _moved(self, scene: SceneTensors, layer: Group, still: tuple[Slot, ...]) -> SceneTensors:
+        """The scene with a layer whose other numbers have moved a little."""
+        around = Surroundings.of(scene, int(layer.order), self.view)
+        tried = self.search.trained(layer, around, STEPS, lambda slot: slot not in still)
+        return inserted(scene, tried.layer)
 
 
 # --- changes --------------------------------------------------------------------------------------------------

@@ -1,15 +1,17 @@
 """No more shapes than a picture needs: of pictures that resvg draws, whose shapes are known; and what is reported."""
 
 import math
+from importlib import import_module
 
 import numpy as np
 import pytest
 import torch
 
-from sdf2vec import Sdf2vecError, fit, fitted
+from sdf2vec import Scene, Sdf2vecError, fit, fitted
 from sdf2vec.engines import resvg
-from sdf2vec.fit.auto import ground_of, is_flat
+from sdf2vec.fit.auto import gain_of_one_more, ground_of, is_flat
 from sdf2vec.fit.settings import settings_of
+from sdf2vec.fit.surroundings import View
 from sdf2vec.image import Picture, resize
 from sdf2vec.quality import quality
 from tests.fit.fitting import RED, remember
@@ -77,6 +79,56 @@ def test_what_is_found_is_as_simple_as_drawn(drawn):
     assert np.allclose((x * 96 + 48, y * 96 + 48), (58, 59), atol=0.3)
     assert np.allclose((half_width * 96, half_height * 96), (20, 15), atol=0.3)
     assert np.allclose(shape.color, (0x10 / 255, 0xA0 / 255, 0x50 / 255), atol=0.01)
+
+
+def test_a_ring_is_one_layer(drawn):
+    """A disc with a disc cut out of it, not one upon another in the colour of the ground."""
+    picture = drawn(WHITE + '<circle cx="46" cy="50" r="26" fill="none" stroke="#205080" stroke-width="14"/>')
+    scene = fit(picture)
+    (layer,) = scene.layers
+    assert [shape.kind for shape in layer.shapes] == ["circle", "circle"]
+    assert layer.joints[0].join == "subtraction"
+    assert [round(96 * shape.parameters[-1]) for shape in layer.shapes] == [33, 19]
+    assert quality(scene, picture).psnr >= 38
+
+
+def test_only_kinds_that_the_user_allows_are_found(drawn):
+    assert kinds_of(fit(drawn(WHITE + DISC), kind="ellipse")) == ["ellipse"]
+
+
+@pytest.mark.parametrize("option", [{"paint": "linear"}, {"min_area": 0.05}])
+def test_what_a_search_can_not_heed_is_painted(drawn, option):
+    """Gradients and a least area are for shapes that are descended."""
+    scene = fit(drawn(WHITE + DISC), 2, preset="fast", **option)
+    assert {shape.kind for layer in scene.layers for shape in layer.shapes} == {"triangle"}
+    assert {shape.paint for layer in scene.layers for shape in layer.shapes} == {option.get("paint", "flat")}
+
+
+def test_a_device_that_is_not_here_is_refused_for_drawings_too(drawn, monkeypatch):
+    monkeypatch.setattr(torch.cuda, "is_available", lambda: False)
+    with pytest.raises(Sdf2vecError, match="no cuda device here"):
+        fit(drawn(WHITE + DISC), device="cuda")
+
+
+def test_a_search_says_when_kernels_are_compiled(drawn, monkeypatch):
+    monkeypatch.setattr(import_module("sdf2vec.render.kernels"), "is_compiled", lambda *arguments: False)
+    said = []
+
+    def stop(progress):
+        said.append(progress.phase)
+        return True
+
+    fit(drawn(WHITE + DISC), callback=stop)
+    assert said == ["compiling kernels (once)"]
+
+
+def test_what_one_more_shape_would_gain_is_told():
+    """Nothing where nothing is missing; much where one colour is missing everywhere."""
+    pixels = np.full((16, 16, 3), 0.5, np.float32)
+    view = View(torch.from_numpy(pixels.transpose(2, 0, 1).copy()), None)
+    right = Scene(16, 16, (), (0.5, 0.5, 0.5))
+    assert gain_of_one_more(right, view) == 0.0
+    assert gain_of_one_more(Scene(16, 16, (), (0.4, 0.5, 0.5)), view) > 1.0
 
 
 @pytest.mark.parametrize("seed", range(2))
