@@ -146,7 +146,6 @@ EXPORTERS: dict[str, Exporter] = {
         ".scene.json",
         deferred("sdf2vec.export.raster", "json"),
         "the scene itself",
-        heeds=("max_bytes",),
         other_endings=(".json",),
         mark=f'"format": "{FORMAT}"'.encode(),
     ),
