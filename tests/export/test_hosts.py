@@ -172,7 +172,7 @@ def test_the_default_shadertoy_of_256_shapes(photo, require_engine):
     assert made.choice.layout == "readable"
     assert len(made.text.encode()) <= 65_536
     assert made.text.count("// 255 triangle") == 1
-    assert levels(shown(photo, "auto"), rendered(photo, 960, 540)) <= 0.1
+    assert levels(shown(photo, "auto", 240, 135), rendered(photo, 240, 135)) <= 0.1
 
 
 def test_the_packed_shadertoy_of_256_shapes(photo, require_engine):
@@ -180,10 +180,10 @@ def test_the_packed_shadertoy_of_256_shapes(photo, require_engine):
     require_engine("opengl")
     made = shader(photo, "shadertoy", Options(title="coffee", layout="packed"))
     assert len(made.text.encode()) <= 15_360  # 15 KiB
-    assert levels(shown(photo, "packed"), rendered(photo, 960, 540)) <= 1.0
+    assert levels(shown(photo, "packed", 960, 540), rendered(photo, 960, 540)) <= 1.0
 
 
-def shown(scene, layout):
+def shown(scene, layout, width, height):
     made = shader(scene, "shadertoy", Options(title="coffee", framing="fit", layout=layout))
-    uniforms = {"iResolution": (960.0, 540.0, 1.0)}
-    return opengl.render(SHADERTOY_HEAD + made.text + SHADERTOY_TAIL, 960, 540, uniforms)
+    uniforms = {"iResolution": (float(width), float(height), 1.0)}
+    return opengl.render(SHADERTOY_HEAD + made.text + SHADERTOY_TAIL, width, height, uniforms)
