@@ -83,7 +83,7 @@ def table(rows: list[Row], command: str) -> Iterator[str]:
         "",
         f"    {command}",
         "",
-        "Text as written with `--max-bytes`, drawn by a real engine (resvg, OpenGL) at the picture's size; PSNR against "
+        "Text as written with `--max-bytes`, drawn by an engine (resvg, OpenGL) at the picture's size; PSNR against "
         "it. WebP: the nearest of several sizes and qualities that is no larger, drawn large by bicubic interpolation.",
         "",
         "| picture | target | limit | bytes | used | shapes | PSNR dB | WebP dB | CPU s |",
