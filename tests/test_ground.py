@@ -57,7 +57,11 @@ def test_shaders_draw_it(target, compositing, require_engine):
     trip = ROUND_TRIPS[target][0]
     require_engine(trip.engine)
     scene = replace(random_scene(compositing=compositing, layers=6, seed=2), background=SHEER)
-    made = sdf2vec.exported(scene, target, framing=None if target == "godot" else "fit")
+    made = (
+        sdf2vec.exported(scene, target)
+        if target == "godot"
+        else sdf2vec.exported(scene, target, framing="fit")
+    )
     assert compare(trip, made, scene, (60, 40)).largest_error < 0.25
 
 

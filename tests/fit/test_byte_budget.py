@@ -20,14 +20,24 @@ def by_count(most, ground=0.0):
 
 @pytest.mark.parametrize("most", [5, 24])
 def test_as_many_shapes_as_there_is_room_for(most):
-    found = fitted(noise(), preset="fast", kind="triangle", max_falloff=0.0, share=by_count(most, 0.25))
+    found = fitted(
+        noise(), preset="fast", kind="triangle", max_falloff=0.0, min_area=1e-4, share=by_count(most, 0.25)
+    )
     assert found.scene.shape_count == most
     assert found.met
     assert "100% of the size limit" in found.reason
 
 
 def test_the_largest_number_of_shapes_holds_too():
-    found = fitted(noise(), preset="fast", kind="circle", max_falloff=0.0, max_shapes=6, share=by_count(50))
+    found = fitted(
+        noise(),
+        preset="fast",
+        kind="circle",
+        max_falloff=0.0,
+        min_area=1e-4,
+        max_shapes=6,
+        share=by_count(50),
+    )
     assert found.scene.shape_count == 6
     assert found.met
 
@@ -39,6 +49,7 @@ def test_what_matters_least_is_left_out():
         preset="fast",
         kind="circle",
         max_falloff=0.0,
+        min_area=1e-4,
         share=lambda scene: max(scene.shape_count, scene.shape_count * 2 - 16) / 20,
     )
     assert 15 <= found.scene.shape_count <= 18
@@ -46,7 +57,7 @@ def test_what_matters_least_is_left_out():
 
 
 def test_a_limit_below_the_ground_is_said():
-    found = fitted(noise(), preset="fast", share=lambda scene: 2.0)
+    found = fitted(noise(), preset="fast", min_area=1e-4, share=lambda scene: 2.0)
     assert not found.met
     assert found.scene.shape_count == 0
 

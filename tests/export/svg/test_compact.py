@@ -30,7 +30,7 @@ def test_the_smallest_drawing_says_a_triangle_in_few_bytes():
             Layer((Shape.of("triangle", color, **corners),), r.uniform(0.01, 0.2), r.uniform(0.4, 1.0))
         )
     scene = Scene(256, 256, tuple(layers), (0.5, 0.5, 0.5))
-    text = text_of(scene, max_bytes=22000)
+    text = smallest(scene, Options())
     root = ElementTree.fromstring(text)
     assert root.get("viewBox") == "0 0 160 160"
     assert root.get("width") == "256"
@@ -51,7 +51,7 @@ def test_a_tighter_limit_takes_no_more_from_the_picture_than_it_must(softest, re
     r = random.Random(9)
     layers = tuple(
         Layer((random_shape(("triangle", "ellipse", "box")[i % 3], r),), r.uniform(0.2, 1.0) * softest, 0.8)
-        for i in range(48)
+        for i in range(24)
     )
     scene = Scene(240, 180, layers, (0.5, 0.5, 0.5))
     wanted = rendered(scene, 480, 360)
