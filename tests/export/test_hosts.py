@@ -64,7 +64,7 @@ def test_hosts_draw_it(target, engine, layouts, transparent, compositing, requir
     )
     for layout in layouts:
         made = Exports(scene).export(target, Options(layout=layout))
-        for size in ((180, 120), (24, 16)):
+        for size in ((180, 120), (24, 16)) if layout == layouts[0] else ((24, 16),):
             result = compare(trip_of(target, engine), made, scene, size)
             assert result.largest_error <= made.error + 1.1, (layout, result)
 
