@@ -41,8 +41,7 @@ class Exports:
         """The smallest form of one export."""
         exporter = EXPORTERS[target]
         scene = self._over[0] if exporter.accepts(options).refusal(self.scene) else self.scene
-        smaller = exporter.smaller(scene, options)
-        return smaller[-1]() if smaller else exporter.write(scene, options)
+        return exporter.from_finest(scene, options)[-1]()
 
     @cached_property
     def _over(self) -> tuple[Scene, float]:
@@ -51,18 +50,14 @@ class Exports:
 
 def _made(exporter: Exporter, scene: Scene, options: Options) -> Exported:
     """The finest that keeps to the size limit; where none does, the smallest."""
-    made = exporter.write(scene, options)
     if options.max_bytes is None:
-        return made
-    limit = ByteLimit.of(options.max_bytes)
-    if limit.share(made.raw) <= 1:
-        return made
-    for make in exporter.smaller(scene, options):
-        smaller = make()
-        if limit.size(smaller.raw) < limit.size(made.raw):
-            made = smaller
-        if limit.share(made.raw) <= 1:
-            return made
+        return exporter.write(scene, options)
+    limit, tried = ByteLimit.of(options.max_bytes), []
+    for make in exporter.from_finest(scene, options):
+        tried.append(make())
+        if limit.share(tried[-1].raw) <= 1:
+            return tried[-1]
+    made = min(tried, key=lambda form: limit.size(form.raw))
     name, size = exporter.suffix[1:], limit.size(made.raw)
     much = (
         f"{name}: {size:,} bytes at least, more than the limit of {limit}; fit fewer shapes, or --shapes auto"

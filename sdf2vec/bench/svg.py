@@ -22,7 +22,7 @@ from .. import api
 from ..arrays import Float64Array
 from ..engines import ENGINES
 from ..export.options import Options
-from ..export.svg import smallest
+from ..export.svg import svg_forms
 from ..exports import Exports
 from ..files import write_atomically
 from ..image import Picture, load, premultiply
@@ -117,7 +117,7 @@ def rows(name: str, scene: Scene, picture: Picture, kind: str, profiles: list[st
 
 def _text(scene: Scene, profile: str, name: str) -> str:
     if profile == SMALLEST:
-        return smallest(scene, Options(title=name))
+        return str(svg_forms(scene, Options(title=name))[-1]().data)
     text = Exports(scene).export("svg", Options(svg_profile=profile, title=name)).data
     assert isinstance(text, str)
     return text

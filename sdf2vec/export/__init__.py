@@ -19,10 +19,10 @@ class Exporter:
     """`suffix` is what a file name gets in place of the picture's; `about` is one line for the user.
 
     `accepts` says which scenes `write` takes, `most_shapes` how many shapes they may have; `heeds` names the options
-    that matter to it; other files that it may write end in `beside`. `smaller(scene, options)` makes what takes fewer
-    bytes than `write`, ever coarser or denser; each is made when it is called. A file that ends in one of `endings` is
-    taken to be for it; one that holds `mark` was made by it. `is_text`: it writes text, not bytes; `is_picture`: the
-    render.
+    that matter to it; other files that it may write end in `beside`. `forms(scene, options)`, where there are several,
+    begin with that of `write` and take ever fewer bytes; each is made when it is called. A file that ends in one of
+    `endings` is taken to be for it; one that holds `mark` was made by it. `is_text`: it writes text, not bytes;
+    `is_picture`: the render.
     """
 
     suffix: str
@@ -33,10 +33,14 @@ class Exporter:
     other_endings: tuple[str, ...] = ()
     beside: tuple[str, ...] = ()
     mark: bytes = MARK.encode()
-    smaller: Callable[[Scene, Options], Sequence[Callable[[], Exported]]] = lambda scene, options: ()
+    forms: Callable[[Scene, Options], Sequence[Callable[[], Exported]]] | None = None
     is_text: bool = True
     is_picture: bool = False
     most_shapes: Callable[[Options], int] = lambda options: MAX_SHAPES
+
+    def from_finest(self, scene: Scene, options: Options) -> Sequence[Callable[[], Exported]]:
+        """All forms of an export."""
+        return self.forms(scene, options) if self.forms else [partial(self.write, scene, options)]
 
     @property
     def endings(self) -> tuple[str, ...]:
@@ -62,7 +66,7 @@ def _shader(
     beside: tuple[str, ...] = (),
 ) -> Exporter:
     module = "sdf2vec.export.shader"
-    write, most_shapes, smaller = (deferred(module, name) for name in ("exported", "most_shapes", "smaller"))
+    write, most_shapes, forms = (deferred(module, name) for name in ("exported", "most_shapes", "forms"))
     return Exporter(
         suffix,
         partial(write, name=name, suffix=suffix),
@@ -70,15 +74,15 @@ def _shader(
         heeds=("layout", *heeds, "max_bytes", "title"),
         other_endings=endings,
         beside=beside,
-        smaller=partial(smaller, name=name),
+        forms=partial(forms, name=name, suffix=suffix),
         most_shapes=partial(most_shapes, name=name),
     )
 
 
 def _svg(name: str, suffix: str, about: str, endings: tuple[str, ...] = ()) -> Exporter:
     module, heeds = "sdf2vec.export.svg", ("svg_profile", "max_bytes", "title", "alt")
-    accepts, smaller = deferred(module, "accepts"), deferred(module, f"smaller_{name}")
-    return Exporter(suffix, deferred(module, name), about, accepts, heeds, endings, smaller=smaller)
+    accepts, forms = deferred(module, "accepts"), deferred(module, f"{name}_forms")
+    return Exporter(suffix, deferred(module, name), about, accepts, heeds, endings, forms=forms)
 
 
 def _raster(name: str, about: str, *endings: str) -> Exporter:
@@ -124,7 +128,7 @@ EXPORTERS: dict[str, Exporter] = {
         "the portable SVG as PDF, by CairoSVG",
         lambda options: Accepts(("over",)),
         ("max_bytes", "title"),
-        smaller=deferred("sdf2vec.export.svg", "smaller_pdf"),
+        forms=deferred("sdf2vec.export.svg", "pdf_forms"),
         mark=b"/Producer (" + MARK.encode(),
         is_text=False,
     ),

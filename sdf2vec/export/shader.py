@@ -5,6 +5,7 @@ from __future__ import annotations
 import base64
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -99,11 +100,9 @@ def exported(scene: Scene, options: Options, name: str, suffix: str) -> Exported
     return Exported(made.text, beside, (made.about,), made.error)
 
 
-def smaller(scene: Scene, options: Options, name: str) -> list[Callable[[], Exported]]:
-    """The layout that takes the fewest bytes, as dense as can be."""
+def forms(scene: Scene, options: Options, name: str, suffix: str) -> list[Callable[[], Exported]]:
+    """The same, and the layout that takes the fewest bytes, as dense as can be."""
     target = TARGETS[name]
-    if target.host is EMBEDDED:
-        return []
     layouts = [layout for layout in TEXTS if layout in _host(target, options).layouts]
     asked = layouts if options.layout == "auto" else [options.layout]
 
@@ -113,7 +112,8 @@ def smaller(scene: Scene, options: Options, name: str) -> list[Callable[[], Expo
         text, best = min(texts, key=lambda found: len(found[0].encode()))
         return Exported(text, {}, (f"{best.about}; without comments, names and spaces",), best.error)
 
-    return [densest]
+    finest = partial(exported, scene, options, name, suffix)
+    return [finest] if target.host is EMBEDDED else [finest, densest]
 
 
 def shader(scene: Scene, name: str, options: Options) -> Shader:

@@ -35,16 +35,17 @@ def accepts(options: Options) -> Accepts:
 
 def svg(scene: Scene, options: Options) -> Exported:
     """The scene as SVG text in pixels of the fitted picture. Raises Sdf2vecError for a scene that is not accepted."""
-    return _made(_planner(scene, options.svg_profile), DETAILS[0], options)
+    return svg_forms(scene, options)[0]()
 
 
-def smaller_svg(scene: Scene, options: Options) -> list[Callable[[], Exported]]:
-    """Ever coarser drawings."""
-    return _smaller(_planner(scene, options.svg_profile), options)
+def svg_forms(scene: Scene, options: Options) -> list[Callable[[], Exported]]:
+    """The same, and ever coarser drawings."""
+    return _forms(scene, options, options.svg_profile)
 
 
-def _smaller(planner: Planner, options: Options) -> list[Callable[[], Exported]]:
-    return [partial(_made, planner, detail, options) for detail in planner.details[1:]]
+def _forms(scene: Scene, options: Options, profile: str) -> list[Callable[[], Exported]]:
+    planner = _planner(scene, profile)
+    return [partial(_made, planner, detail, options) for detail in planner.details]
 
 
 def _made(planner: Planner, detail: Detail, options: Options) -> Exported:
@@ -53,20 +54,14 @@ def _made(planner: Planner, detail: Detail, options: Options) -> Exported:
     )
 
 
-def smallest(scene: Scene, options: Options) -> str:
-    """The smallest drawing of a scene there is."""
-    planner = _planner(scene, options.svg_profile)
-    return _text(planner, planner.details[-1], options)
-
-
 def data_uri(scene: Scene, options: Options) -> Exported:
     """The SVG as a data URI, for `src="…"` and `url("…")`: URL-encoded, or in base64 where that is smaller."""
-    return _as_uri(partial(svg, scene, options))
+    return data_uri_forms(scene, options)[0]()
 
 
-def smaller_data_uri(scene: Scene, options: Options) -> list[Callable[[], Exported]]:
-    """Ever coarser drawings."""
-    return [partial(_as_uri, make) for make in smaller_svg(scene, options)]
+def data_uri_forms(scene: Scene, options: Options) -> list[Callable[[], Exported]]:
+    """The same, and ever coarser drawings."""
+    return [partial(_as_uri, make) for make in svg_forms(scene, options)]
 
 
 def _as_uri(make: Callable[[], Exported]) -> Exported:
@@ -83,12 +78,12 @@ def _quoted(text: str) -> str:
 
 def pdf(scene: Scene, options: Options) -> Exported:
     """The portable SVG as PDF, by CairoSVG. Raises Sdf2vecError where cairo is not installed."""
-    return _as_pdf(partial(_made, _planner(scene, PORTABLE), DETAILS[0], options))
+    return pdf_forms(scene, options)[0]()
 
 
-def smaller_pdf(scene: Scene, options: Options) -> list[Callable[[], Exported]]:
-    """Ever coarser drawings."""
-    return [partial(_as_pdf, make) for make in _smaller(_planner(scene, PORTABLE), options)]
+def pdf_forms(scene: Scene, options: Options) -> list[Callable[[], Exported]]:
+    """The same, and ever coarser drawings."""
+    return [partial(_as_pdf, make) for make in _forms(scene, options, PORTABLE)]
 
 
 def _as_pdf(make: Callable[[], Exported]) -> Exported:

@@ -12,7 +12,7 @@ from sdf2vec import Layer, Scene, Shape, exported
 from sdf2vec.engines import ENGINES
 from sdf2vec.export.exported import MARK
 from sdf2vec.export.options import Options
-from sdf2vec.export.svg import smallest
+from sdf2vec.export.svg import svg_forms
 from tests.export.svg.drawings import NAMESPACE, rendered, text_of
 from tests.scenes import random_shape
 
@@ -30,7 +30,7 @@ def test_the_smallest_drawing_says_a_triangle_in_few_bytes():
             Layer((Shape.of("triangle", color, **corners),), r.uniform(0.01, 0.2), r.uniform(0.4, 1.0))
         )
     scene = Scene(256, 256, tuple(layers), (0.5, 0.5, 0.5))
-    text = smallest(scene, Options())
+    text = str(svg_forms(scene, Options())[-1]().data)
     root = ElementTree.fromstring(text)
     assert root.get("viewBox") == "0 0 160 160"
     assert root.get("width") == "256"
@@ -55,7 +55,7 @@ def test_a_tighter_limit_takes_no_more_from_the_picture_than_it_must(softest, re
     )
     scene = Scene(240, 180, layers, (0.5, 0.5, 0.5))
     wanted = rendered(scene, 480, 360)
-    least = smallest(scene, Options())
+    least = str(svg_forms(scene, Options())[-1]().data)
     texts = [text_of(scene)]
     while texts[-1] != least:
         texts.append(text_of(scene, max_bytes=len(texts[-1].encode()) - 1))
