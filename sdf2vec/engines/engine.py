@@ -1,7 +1,9 @@
 """What the engines have in common: their record, their error and their checks."""
 
 import io
-from collections.abc import Callable, Mapping
+import shutil
+import subprocess
+from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
 from functools import cache
@@ -92,6 +94,21 @@ def require_drawable(width: int, height: int) -> None:
             f"cannot draw {width} × {height} pixels: "
             f"a side has 1 to {LARGEST_SIDE}, the picture at most {LARGEST_AREA}"
         )
+
+
+def require_program(program: str) -> None:
+    """Raises EngineError where a command is not here."""
+    if not shutil.which(program):
+        raise EngineError(f"{program} is not installed")
+
+
+def answer_of(command: Sequence[str], given: bytes, refused: str) -> bytes:
+    """What a command writes when it is given this. Raises EngineError where it fails, or writes nothing."""
+    done = subprocess.run(command, input=given, capture_output=True, check=False)
+    if done.returncode != 0 or not done.stdout:
+        log = done.stderr.decode(errors="replace")
+        raise EngineError(f"{refused}: {log}", log=log)
+    return done.stdout
 
 
 def pixels_of(png: bytes) -> Picture:

@@ -1,17 +1,13 @@
 """SVG drawn by Inkscape's command."""
 
-import shutil
-import subprocess
-
-from sdf2vec.engines.engine import EngineError, Picture, pixels_of, with_viewport
+from sdf2vec.engines.engine import Picture, answer_of, pixels_of, require_program, with_viewport
 
 PROGRAM = "inkscape"
 
 
 def probe() -> None:
     """Raises where Inkscape's command is not here."""
-    if not shutil.which(PROGRAM):
-        raise EngineError(f"{PROGRAM} is not installed")
+    require_program(PROGRAM)
 
 
 def render(svg: str, width: int, height: int) -> Picture:
@@ -26,10 +22,6 @@ def render(svg: str, width: int, height: int) -> Picture:
     sized = with_viewport(svg, width, height).encode()
     area = ["--export-area-page", f"--export-width={width}", f"--export-height={height}"]
     command = [PROGRAM, "--pipe", *area, "--export-type=png", "--export-filename=-"]
-    done = subprocess.run(command, input=sized, capture_output=True, check=False)
-    if done.returncode != 0 or not done.stdout:  # it ends with 0 where it can't read what it is given
-        log = done.stderr.decode(errors="replace")
-        raise EngineError(f"Inkscape refuses the SVG: {log}", log=log)
-    pixels = pixels_of(done.stdout)
+    pixels = pixels_of(answer_of(command, sized, "Inkscape refuses the SVG"))
     pixels[pixels[..., 3] == 0.0] = 0.0  # where nothing is drawn it says white
     return pixels

@@ -1,17 +1,13 @@
 """SVG drawn by librsvg's command."""
 
-import shutil
-import subprocess
-
-from sdf2vec.engines.engine import EngineError, Picture, pixels_of, with_viewport
+from sdf2vec.engines.engine import Picture, answer_of, pixels_of, require_program, with_viewport
 
 PROGRAM = "rsvg-convert"
 
 
 def probe() -> None:
     """Raises where librsvg's command is not here."""
-    if not shutil.which(PROGRAM):
-        raise EngineError(f"{PROGRAM} is not installed")
+    require_program(PROGRAM)
 
 
 def render(svg: str, width: int, height: int) -> Picture:
@@ -23,9 +19,5 @@ def render(svg: str, width: int, height: int) -> Picture:
     Raises:
         EngineError: the SVG is refused.
     """
-    sized = with_viewport(svg, width, height)
-    done = subprocess.run([PROGRAM, "--unlimited"], input=sized.encode(), capture_output=True, check=False)
-    if done.returncode != 0:
-        log = done.stderr.decode(errors="replace")
-        raise EngineError(f"librsvg refuses the SVG: {log}", log=log)
-    return pixels_of(done.stdout)
+    sized = with_viewport(svg, width, height).encode()
+    return pixels_of(answer_of([PROGRAM, "--unlimited"], sized, "librsvg refuses the SVG"))
