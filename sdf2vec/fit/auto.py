@@ -24,7 +24,7 @@ from ..render.tensors import SceneTensors, from_scene, to_scene
 from ..scene import Scene
 from ..threads import threads_of_its_own
 from .backends import CPU, choose
-from .byte_budget import Share, within
+from .byte_budget import SLOPE, Share, within
 from .initialization import Layers, background_of, empty_groups
 from .joining import Search
 from .loop import Callback, Progress, Stopped, fit_picture, scaled, view_of
@@ -46,7 +46,6 @@ SOFT_MOST = 16  # shapes of a soft drawing
 GOOD = 10**-3.5  # mean squared error, 35 dB, of what is surely found
 DOMINANT = 0.15  # share of the most common colour, of a picture that has a ground
 TRIES = 4  # fits for a target
-SLOPE = 1.7  # dB for twice the shapes, about
 
 
 @dataclass(frozen=True)

@@ -28,10 +28,9 @@ RESOLUTION = 128  # pixels squared, where it is seen which shapes matter least
 
 
 class Probe(NamedTuple):
-    """One sort of shapes: how to fit them, the share that each takes, how many there may be, what PSNR is to be had."""
+    """One sort of shapes: how to fit them, how many there may be, what PSNR is to be had."""
 
     settings: Settings
-    each: float
     wanted: int
     hoped: float  # dB
 
@@ -46,7 +45,7 @@ def within(picture: Picture, settings: Settings, share: Share, callback: Callbac
         return best
     probes = [_probe(sort, picture, share, callback) for sort in _sorts(settings)]
     chosen = max(probes, key=lambda probe: probe.hoped)
-    each, count = chosen.each, chosen.wanted
+    count = chosen.wanted
     for _ in range(FITS):
         scene = fit_picture(picture, structs.replace(chosen.settings, shapes=count), callback)
         taken = share(scene)
@@ -63,10 +62,7 @@ def within(picture: Picture, settings: Settings, share: Share, callback: Callbac
 
 def _nothing(picture: Picture, settings: Settings, view: View) -> Scene:
     """The ground alone."""
-    size = (
-        picture.width / min(picture.width, picture.height),
-        picture.height / min(picture.width, picture.height),
-    )
+    size = Scene(picture.width, picture.height, ()).extent
     ground = SceneTensors([], background_of(view.target), settings.compositing, size)
     return to_scene(ground, picture.width, picture.height)
 
@@ -88,7 +84,7 @@ def _probe(settings: Settings, picture: Picture, share: Share, callback: Callbac
     each = max((most - least) / max(count - 1, 1), 1e-9)
     wanted = 1 + math.floor((1.0 - least) / each) if least <= 1 else 0
     hoped = psnr_of(few, picture) + SLOPE * math.log2(max(wanted, 1e-3) / count)
-    return Probe(settings, each, min(max(wanted, 1), settings.most), hoped)
+    return Probe(settings, min(max(wanted, 1), settings.most), hoped)
 
 
 def _trimmed(scene: Scene, view: View, share: Share, each: float, taken: float) -> tuple[Scene, float]:

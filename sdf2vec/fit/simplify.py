@@ -16,10 +16,9 @@ from ..expr import const
 from ..graph import scalarize
 from ..layer import LOOK, Part, Slot, slots
 from ..lower.torch import Tensors, compile_torch
-from ..paints import BASE, FLAT, PAINTS
 from ..render.tensors import Group, SceneTensors
 from ..shapes import KINDS
-from ..units import ANGLE, COLOR
+from ..units import ANGLE
 from .candidates import reductions
 from .joining import Search, inserted
 from .sparse import error_of
@@ -108,15 +107,6 @@ def _extent(kind: str) -> Callable[..., Tensors]:
     )
 
 
-def _flat(layer: Group, view: View) -> Iterator[Change]:
-    """A gradient as its mean colour."""
-    for index, part in enumerate(layer.structure):
-        if part.adds and not PAINTS[part.paint].is_flat:
-            ends = [tensor for slot, tensor in layer.values.items() if slot.part == index and _is_color(slot)]
-            mean = torch.stack(ends).mean(0)
-            yield _with_part(layer, index, part._replace(paint=FLAT), {BASE.name: mean}), ()
-
-
 def _with_part(layer: Group, index: int, part: Part, own: dict[str, torch.Tensor]) -> Group:
     """The layer with another part in the place of one, of which these numbers are known; the rest is what it was."""
     structure = (*layer.structure[:index], part, *layer.structure[index + 1 :])
@@ -158,10 +148,6 @@ def _opaque(layer: Group, view: View) -> Iterator[Change]:
         yield _with(layer, slot, 1.0), (slot,)
 
 
-def _is_color(slot: Slot) -> bool:
-    return slot.parameter.unit is COLOR
-
-
 def _sharp(layer: Group, view: View) -> Iterator[Change]:
     slot = Slot(None, LOOK[1])
     pixel = 1.0 / min(view.target.shape[1:])
@@ -187,7 +173,6 @@ def _with(layer: Group, changed: Slot, value: float) -> Group:
 CHANGES: tuple[Propose, ...] = (
     _fewer_parts,
     _circle,
-    _flat,
     _unrounded,
     _upright,
     _opaque,
