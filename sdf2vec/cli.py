@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Literal, NoReturn
 from msgspec.structs import replace
 
 from . import __version__, cached, completing, guard, warming
-from .batch import Batch, about, about_left, check_streams, exit_status, run_batch
+from .batch import READ_TOO, Batch, about, about_left, check_streams, exit_status, run_batch
 from .checkpoint import OFF
 from .converting import Work, write_exports
 from .declared import add_flags, checked, chosen, options_of
@@ -155,7 +155,7 @@ def _convert(arguments: list[str]) -> int:
     options = parser.parse_intermixed_args(arguments)
     places = places_of(options.emit, options.output, "glsl")
     given, running = chosen(options, Settings), _running_of(options)
-    also_read = [given[name] for name in ("start", "weights") if name in given]
+    also_read = [given[name] for name in READ_TOO if name in given]
     sources = sources_of(options.inputs, running.recursive)
     jobs = plan(sources, places, also_read, running.force, running.checkpoint)
     check_streams(jobs, running)

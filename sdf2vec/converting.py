@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import gzip
 import time
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
@@ -15,6 +14,7 @@ from .checkpoint import Checkpoint
 from .deferred import deferred
 from .errors import Sdf2vecError
 from .export import EXPORTERS
+from .export.byte_limit import gzipped_size
 from .export.exported import Exported
 from .export.options import Options
 from .exports import Exports, share_of_limit
@@ -203,7 +203,7 @@ def _write_beside(path: str, suffix: str, files: Mapping[str, bytes], teller: Te
 
 def _packed(target: str, data: bytes) -> str:
     """The size that a web server would send an SVG with."""
-    return f" ({len(gzip.compress(data, 9, mtime=0)):,} gzipped)" if target == "svg" else ""
+    return f" ({gzipped_size(data):,} gzipped)" if target == "svg" else ""
 
 
 def _write(path: str, data: bytes) -> None:

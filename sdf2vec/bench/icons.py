@@ -9,7 +9,6 @@ Any folder of SVG files will do; those of the npm packages `@twemoji/svg` and `f
 from __future__ import annotations
 
 import argparse
-import gzip
 import time
 from collections.abc import Callable, Iterator
 from pathlib import Path
@@ -22,6 +21,7 @@ from .. import api
 from ..arrays import Float32Array
 from ..engines import resvg
 from ..engines.engine import EngineError
+from ..export.byte_limit import gzipped_size
 from ..files import write_atomically
 from ..image import encode_png, premultiply
 from ..scene import Scene
@@ -32,7 +32,6 @@ from .svg_shapes import count_numbers, parsed, shapes_of
 ICONS = 100
 SIDE = 256  # pixels
 SHOWN = 8  # icons of the figure
-ZIPPED = 9  # gzip's level
 NEAR = 0.02  # ΔE00 that is no difference
 LIMIT = "max_bytes"
 GIVEN = ("kind", "preset", "max_falloff", LIMIT)  # options of the fit and of its export
@@ -84,7 +83,7 @@ def measured(
     height, width = picture.shape[:2]
     drawn = resvg.render(svg, width, height)
     data = svg.encode()
-    zipped = len(gzip.compress(data, ZIPPED, mtime=0))
+    zipped = gzipped_size(data)
     near = psnr(premultiply(picture), premultiply(drawn))
     error = color_error(picture, drawn)
     return Drawing(shapes, count_numbers(svg), len(data), zipped, near, error, seconds), drawn

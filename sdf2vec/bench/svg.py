@@ -8,7 +8,6 @@ Two pictures with alpha, made by code, are added to those named.
 from __future__ import annotations
 
 import argparse
-import gzip
 import math
 import time
 from collections.abc import Iterator
@@ -21,6 +20,7 @@ from numpy.typing import NDArray
 from .. import api
 from ..arrays import Float64Array
 from ..engines import ENGINES
+from ..export.byte_limit import gzipped_size
 from ..export.options import Options
 from ..export.svg import svg_forms
 from ..exports import Exports
@@ -100,7 +100,7 @@ def rows(name: str, scene: Scene, picture: Picture, kind: str, profiles: list[st
     original = _original(picture)
     for profile in profiles:
         text = _text(scene, profile, name)
-        sizes = len(text.encode()), len(gzip.compress(text.encode(), 9, mtime=0))
+        sizes = len(text.encode()), gzipped_size(text.encode())
         for renderer in RENDERERS[profile]:
             if ENGINES[renderer].missing():
                 continue

@@ -27,7 +27,7 @@ class ByteLimit(NamedTuple):
 
     def size(self, data: bytes) -> int:
         """How many bytes count."""
-        return len(gzip.compress(data, 9, mtime=0)) if self.gzipped else len(data)
+        return gzipped_size(data) if self.gzipped else len(data)
 
     def share(self, data: bytes) -> float:
         """Of the limit, above 1 for what is too large."""
@@ -35,3 +35,8 @@ class ByteLimit(NamedTuple):
 
     def __str__(self) -> str:
         return f"{self.most:,} bytes{' gzipped' if self.gzipped else ''}"
+
+
+def gzipped_size(data: bytes) -> int:
+    """How many bytes a web server sends."""
+    return len(gzip.compress(data, 9, mtime=0))
