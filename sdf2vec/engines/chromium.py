@@ -8,6 +8,7 @@ import atexit
 import mimetypes
 import shutil
 import tempfile
+import time
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from functools import cache
@@ -20,6 +21,7 @@ from sdf2vec.engines.engine import EngineError, Picture, pixels_of, require_draw
 PROGRAMS = ("chromium", "chromium-browser", "google-chrome", "google-chrome-stable")
 ORIGIN = "http://localhost/"  # a secure context, which WebGPU wants; requests never leave the process
 SECONDS = 60.0
+POLL = 20.0  # milliseconds between two looks at a page
 
 ARGUMENTS = (
     "--no-sandbox",
@@ -86,8 +88,8 @@ def opened(files: Mapping[str, str | bytes], width: int, height: int) -> Iterato
     """A page that shows `files["index.html"]` in a viewport of `width` × `height` pixels, one device pixel each.
 
     Other files are found by their names relative to it; every other address fails. The page is Playwright's
-    (`evaluate`, `wait_for_function`, `on("console", …)`), and is closed at the end. `evaluate` gives Playwright's
-    own errors.
+    (`evaluate`, `on("console", …)`), and is closed at the end. `evaluate` gives Playwright's own errors. Its
+    `wait_for_function` needs `eval` and so fails under a Content-Security-Policy: `wait_until` does not.
 
     Raises:
         EngineError: Chromium is missing or the size is out of range.
@@ -102,6 +104,19 @@ def opened(files: Mapping[str, str | bytes], width: int, height: int) -> Iterato
         yield page
     finally:
         page.close()
+
+
+def wait_until(page: Page, condition: str, arg: Any = None, seconds: float = SECONDS) -> None:
+    """Until a JavaScript expression, or a function of `arg`, is true on a page.
+
+    Raises:
+        EngineError: it is not in so many seconds.
+    """
+    end = time.monotonic() + seconds
+    while not page.evaluate(condition, arg):
+        if time.monotonic() > end:
+            raise EngineError(f"in {seconds:g} seconds not true on the page: {condition}")
+        page.wait_for_timeout(POLL)
 
 
 def screenshot(page: Page, selector: str | None = None) -> Picture:

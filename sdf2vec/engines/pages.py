@@ -10,7 +10,7 @@ from pathlib import Path
 
 from playwright.sync_api import Page
 
-from sdf2vec.engines.chromium import opened, probe, screenshot
+from sdf2vec.engines.chromium import opened, probe, screenshot, wait_until
 from sdf2vec.engines.engine import EngineError, Picture
 
 __all__ = ["element", "image", "material", "page", "probe", "probe_three"]
@@ -68,16 +68,17 @@ def material(module: str, width: int, height: int) -> Picture:
     """A rectangle with the three.js material that a module makes."""
     html = MATERIAL.format(width=width, height=height)
     with opened({"index.html": html, "material.js": module, **_three_modules()}, width, height) as shown:
-        shown.wait_for_function("document.title === 'drawn'")
+        wait_until(shown, "document.title === 'drawn'")
         shown.evaluate(TWO_FRAMES)
         return screenshot(shown, "canvas")
 
 
 def _wait_for(shown: Page, canvas: str, width: int, height: int) -> None:
     """Until a canvas has its size, and is painted."""
-    shown.wait_for_function(
+    wait_until(
+        shown,
         f"([w, h]) => {{ const c = {canvas}; return c?.width === w && Math.abs(c.height - h) < 2 }}",
-        arg=[width, height],
+        [width, height],
     )
     shown.evaluate(TWO_FRAMES)
 

@@ -37,10 +37,11 @@ def module():
 
 
 def assert_shows(page, scene, width, height):
-    page.wait_for_function(
+    chromium.wait_until(
+        page,
         "([w, h]) => { const c = document.querySelector('sdf-image').shadowRoot.querySelector('canvas');"
         " return c && c.width === w && c.height === h }",
-        arg=[width, height],
+        [width, height],
     )
     page.wait_for_timeout(300)
     expected = reference.render(scene, width, height).permute(1, 2, 0).numpy()
@@ -113,7 +114,7 @@ def element(name):
 
 def assert_all_shown(page, scenes, shown=None):
     """Every element of the grid shows its scene, in 40 × 40 pixels."""
-    page.wait_for_function(f"{SHOWN}.length === {len(scenes)} && {SHOWN}.every(Boolean)")
+    chromium.wait_until(page, f"{SHOWN}.length === {len(scenes)} && {SHOWN}.every(Boolean)")
     page.wait_for_timeout(300)
     pixels = chromium.screenshot(page)
     pixels[..., :3] *= pixels[..., 3:]
@@ -240,7 +241,7 @@ def test_what_scene_files_may_not_say_is_refused(opened):
       return scenes.map((scene) => { try { e.show(scene); return 'shown' } catch (error) { return error.message } });
     }"""
     with opened(json.dumps(GOOD), 100, 100) as page:
-        page.wait_for_function(f"{SHOWN}[0]")
+        chromium.wait_until(page, f"{SHOWN}[0]")
         found = page.evaluate(collect, [scene for scene, _ in HOSTILE])
         assert [words in said for words, said in zip(names, found, strict=True)] == [True] * len(names), found
         assert_shows(page, sdf2vec.loads(json.dumps(GOOD)), 100, 100)
@@ -250,4 +251,4 @@ def test_what_scene_files_may_not_say_is_refused(opened):
 def test_the_thinnest_scene_is_quick(opened, width, height):
     scene = random_scene(("circle",), layers=40, seed=3, width=width, height=height)
     with opened(dumps(scene), 100, 100) as page:
-        page.wait_for_function(f"{SHOWN}[0]", timeout=20_000)
+        chromium.wait_until(page, f"{SHOWN}[0]", seconds=20)

@@ -49,7 +49,7 @@ def box(page, selector):
 
 def assert_shows(page, scene, levels=1.6):
     """The picture on the page is the render at its size in device pixels, but for 8-bit rounding."""
-    page.wait_for_function("document.querySelector('canvas').width > 1")
+    chromium.wait_until(page, "document.querySelector('canvas').width > 1")
     page.wait_for_timeout(300)
     width, height = page.evaluate(
         "[document.querySelector('canvas').width, document.querySelector('canvas').height]"
@@ -65,7 +65,7 @@ def test_page_shows_the_scene_and_follows_its_size(opened):
     with opened(page_of(SCENE), 400, 500) as page:
         assert_shows(page, SCENE)
         page.set_viewport_size({"width": 641, "height": 700})
-        assert page.wait_for_function("document.querySelector('canvas').width > 550")
+        chromium.wait_until(page, "document.querySelector('canvas').width > 550")
         assert_shows(page, SCENE)
         assert not page.locator(".fallback").is_visible()
 
@@ -75,7 +75,7 @@ def test_page_holds_all_that_it_needs(opened):
     with opened(page_of(SCENE), 300, 300) as page:
         page.on("request", lambda request: requests.append(request.url))
         page.reload()
-        page.wait_for_function("document.querySelector('canvas').width > 1")
+        chromium.wait_until(page, "document.querySelector('canvas').width > 1")
     assert [url for url in requests if not url.startswith("data:")] == [chromium.ORIGIN]
     assert not re.search(r'(src|href)="(?!data:)', page_of(SCENE))
 
@@ -106,7 +106,9 @@ def test_buttons_copy_the_texts(opened):
         for name in ("svg", "shadertoy", "glsl", "wgsl"):
             page.locator(f'[data-text="{name}"]').focus()
             page.keyboard.press("Enter")
-            page.wait_for_function("document.querySelector('[role=status]').textContent.endsWith('copied.')")
+            chromium.wait_until(
+                page, "document.querySelector('[role=status]').textContent.endsWith('copied.')"
+            )
             copied = page.evaluate("window.copied")
             assert _canonical(copied) == _canonical(_text(name)) if name == "svg" else copied == _text(name)
             page.evaluate("document.querySelector('[role=status]').textContent = ''")
@@ -128,7 +130,7 @@ def test_slider_uncovers_the_original(opened):
     red = png_of_red()
     blue = Scene(12, 8, (Layer((Shape.of("circle", (0, 0, 1), center=(0, 0), radius=3),), 0.1),))
     with opened(page_of(blue, original=red), 300, 300) as page:
-        page.wait_for_function("document.querySelector('canvas').width > 1")
+        chromium.wait_until(page, "document.querySelector('canvas').width > 1")
         page.locator("#split").focus()
         for _ in range(20):
             page.keyboard.press("ArrowRight")

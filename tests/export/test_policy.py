@@ -53,7 +53,7 @@ def test_a_page_with_hostile_words_works_under_its_own_policy(require_engine):
     with chromium.opened({"index.html": text}, 200, 300) as page:
         page.on("console", lambda message: said.append(message.text))
         page.reload()
-        page.wait_for_function(DRAWN)
+        chromium.wait_until(page, DRAWN)
         page.wait_for_timeout(300)
         assert red_in_the_middle(page, "canvas")
         assert page.evaluate("window.ran") is None
@@ -85,7 +85,7 @@ def test_the_element_works_under_a_strict_policy(require_engine):
     with chromium.opened(files, 200, 300) as shown:
         shown.on("console", lambda message: said.append(message.text))
         shown.reload()
-        shown.wait_for_function(IN_ELEMENT)
+        chromium.wait_until(shown, IN_ELEMENT)
         shown.wait_for_timeout(300)
         assert red_in_the_middle(shown, "sdf-image")
         assert shown.evaluate("window.ran") is None
