@@ -64,7 +64,7 @@ def fitted(
 
 
 def share_of(targets: Sequence[str], **options: Unpack[ExportKeywords]) -> Callable[[Scene], float]:
-    """How much of `max_bytes` the largest of some exports of a scene takes, each in its smallest form: for `fitted`.
+    """How much of `max_bytes` the largest of some exports of a scene takes, each in a small form: for `fitted`.
 
     Raises Sdf2vecError for an unknown target and for a limit that is none.
     """
@@ -83,24 +83,30 @@ def render(scene: Scene, width: int | None = None, height: int | None = None) ->
     return _render(scene, width, height)
 
 
-def export(scene: Scene, target: str, **options: Unpack[ExportKeywords]) -> str | bytes:
+def export(
+    scene: Scene, target: str, *, picture: PictureSource | None = None, **options: Unpack[ExportKeywords]
+) -> str | bytes:
     """The scene in a target format, a key of `sdf2vec.export.EXPORTERS`: text, or bytes for "pdf" and pictures.
 
     Options: those of `exported`. Raises Sdf2vecError, also for a size limit that can't be kept to.
     """
-    made = exported(scene, target, **options)
+    made = exported(scene, target, picture=picture, **options)
     if not made.met:
         raise Sdf2vecError(made.notes[-1])
     return made.data
 
 
 @documented(Options)
-def exported(scene: Scene, target: str, **options: Unpack[ExportKeywords]) -> Exported:
+def exported(
+    scene: Scene, target: str, *, picture: PictureSource | None = None, **options: Unpack[ExportKeywords]
+) -> Exported:
     """The scene in a target format, with the files that belong beside it and what was chosen or given up.
 
+    `picture`: what it was fitted to, in any form that `fit` takes; a drawing is then small, and near to that.
     Raises Sdf2vecError for an unknown target and for what can't be exported.
     """
-    return Exports(scene).export(target, checked(Options, options))
+    near = None if picture is None else _load_picture(picture)
+    return Exports(scene, near).export(target, checked(Options, options))
 
 
 def _png(scene: Scene) -> str:

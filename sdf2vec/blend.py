@@ -17,6 +17,7 @@ from .operation import FLOAT, VEC2, VEC3, VEC4
 
 STEEPNESS = 10.0  # the thesis' normalised sigmoid: 5 − 10·d/falloff
 CUTOFF = 1.0 / 512.0  # coverage below it counts as 0, above 1 − it as 1: half a level of 8 bits
+EDGE_DEVIATION = math.pi / math.sqrt(3.0) / STEEPNESS  # standard deviation of the edge's slope, in falloffs
 MIN_FALLOFF_PIXELS = 1.6  # a logistic edge of this falloff has the variance of a one-pixel box filter
 SHARPEST = 1e-6  # scene units: joins of no smoothness have this one
 REACH = math.log(1.0 / CUTOFF - 1.0) / STEEPNESS  # half the width of the soft edge, in falloffs

@@ -91,7 +91,7 @@ def convert(job: Job, work: Work, teller: Teller, stop: Stop) -> Done:
     if is_lettering(picture.pixels):
         teller.say(f"  {HINT}")
     original = _original(data(), picture) if work.running.with_original else None
-    written = write_exports(scene, job, replace(work.export, original=original), teller)
+    written = write_exports(scene, job, replace(work.export, original=original), teller, picture)
     checkpoint.remove()
     seconds = time.perf_counter() - started
     teller.say(f"  {seconds:.1f} s in all{_phases(teller)}")
@@ -172,10 +172,12 @@ class Written(NamedTuple):
     met: bool
 
 
-def write_exports(scene: Scene, job: Job, options: Options, teller: Teller) -> Written:
+def write_exports(
+    scene: Scene, job: Job, options: Options, teller: Teller, picture: Picture | None = None
+) -> Written:
     """Writes the exports of a scene, by default titled after the input."""
     title = _title(job, options)
-    exports, written, met = Exports(scene), 0, True
+    exports, written, met = Exports(scene, picture), 0, True
     for target, path in job.outputs.items():
         chosen = replace(options, title=title, alone=path == STREAM)
         with teller.phase(f"export {target}"):

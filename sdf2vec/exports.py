@@ -2,26 +2,49 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+import math
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
-from functools import cached_property
+from functools import cached_property, partial
+from typing import TYPE_CHECKING
 
 from .declared import check_choice
 from .deferred import deferred
 from .export import EXPORTERS, Exporter
 from .export.byte_limit import ByteLimit
 from .export.exported import Exported
-from .export.options import Options
+from .export.options import PICTURE, Options
+from .grain import DENSE, GRAINS, USUAL, Grain
 from .scene import Scene
 
+if TYPE_CHECKING:
+    from .fit.surroundings import View
+    from .image import Picture
+
+FEW = 32  # sharp layers, of which plain elements with names are small enough
+HARDLY = 0.2  # dB that a small drawing may lose of the picture
+ABOUT = 1.03  # of a size limit, that a drawing which is still to be fitted may seem to take
+
+_drawable: Callable[[Scene, Callable[[float], View], Grain], Scene] = deferred(
+    "sdf2vec.fit.drawable", "drawable"
+)
+_rounded: Callable[[Scene, Grain], Scene] = deferred("sdf2vec.fit.drawable", "rounded")
+_views_of: Callable[[Picture], Callable[[float], View]] = deferred("sdf2vec.fit.drawable", "views_of")
+_views_of_render: Callable[[Scene], Callable[[float], View]] = deferred(
+    "sdf2vec.fit.drawable", "views_of_render"
+)
+_psnr_of: Callable[[Scene, Picture], float] = deferred("sdf2vec.quality", "psnr_of")
 _over_of: Callable[[Scene], tuple[Scene, float]] = deferred("sdf2vec.fit.conversion", "over_of")
 
 
 class Exports:
-    """The exports of one scene; where several need the scene under `over`, it is fitted again once."""
+    """The exports of one scene, fitted to a picture if that is given, else to what its render shows.
 
-    def __init__(self, scene: Scene) -> None:
-        self.scene = scene
+    What several need of it is fitted again once: the scene under `over`, and one that a small drawing can say.
+    """
+
+    def __init__(self, scene: Scene, picture: Picture | None = None) -> None:
+        self.scene, self.picture = scene, picture
 
     def export(self, target: str, options: Options | None = None) -> Exported:
         """One export. Raises Sdf2vecError for an unknown target and for what the exporter can't do."""
@@ -30,49 +53,105 @@ class Exports:
         exporter.check_count(self.scene.shape_count, options)
         refusal = exporter.accepts(options).refusal(self.scene)
         if not refusal:
-            return _made(exporter, self.scene, options)
+            return self._made(exporter, self.scene, options)
         scene, decibels = self._over
         near = f" ({decibels:.1f} dB from its render)" if scene.layers else ""
         note = f"{target}: nothing can be added up {refusal}: fitted again under over{near}"
-        made = _made(exporter, scene, options)
+        made = self._made(exporter, scene, options)
         return replace(made, notes=(note, *made.notes))
 
-    def smallest(self, target: str, options: Options) -> Exported:
-        """The smallest form of one export."""
+    def densest(self, target: str, options: Options) -> Exported:
+        """The form of one export that says most with few bytes, about: its numbers are rounded, not fitted again."""
         exporter = EXPORTERS[target]
         scene = self._over[0] if exporter.accepts(options).refusal(self.scene) else self.scene
+        if exporter.draw and exporter.draws(scene, options):
+            return exporter.draw(_rounded(scene, DENSE), options, DENSE)
         return exporter.from_finest(scene, options)[-1]()
 
     @cached_property
     def _over(self) -> tuple[Scene, float]:
         return _over_of(self.scene)
 
+    def _made(self, exporter: Exporter, scene: Scene, options: Options) -> Exported:
+        """The finest that keeps to the size limit; where none does, the smallest."""
+        if options.max_bytes is None:
+            return self._near_enough(exporter, scene, options) or exporter.from_finest(scene, options)[0]()
+        limit, tried = ByteLimit.of(options.max_bytes), []
+        for make in self._from_finest(exporter, scene, options, limit):
+            tried.append(make())
+            if limit.share(tried[-1].raw) <= 1:
+                return tried[-1]
+        made = min(tried, key=lambda form: limit.size(form.raw))
+        name, size = exporter.suffix[1:], limit.size(made.raw)
+        much = f"{name}: {size:,} bytes at least, more than the limit of {limit}; fit fewer shapes, or --shapes auto"
+        return replace(made, notes=(*made.notes, much), met=False)
 
-def _made(exporter: Exporter, scene: Scene, options: Options) -> Exported:
-    """The finest that keeps to the size limit; where none does, the smallest."""
-    if options.max_bytes is None:
-        return exporter.write(scene, options)
-    limit, tried = ByteLimit.of(options.max_bytes), []
-    for make in exporter.from_finest(scene, options):
-        tried.append(make())
-        if limit.share(tried[-1].raw) <= 1:
-            return tried[-1]
-    made = min(tried, key=lambda form: limit.size(form.raw))
-    name, size = exporter.suffix[1:], limit.size(made.raw)
-    much = (
-        f"{name}: {size:,} bytes at least, more than the limit of {limit}; fit fewer shapes, or --shapes auto"
-    )
-    return replace(made, notes=(*made.notes, much), met=False)
+    def _near_enough(self, exporter: Exporter, scene: Scene, options: Options) -> Exported | None:
+        """The smallest drawing that loses hardly anything of the picture."""
+        picture, wanted = self.picture, options.svg_fidelity == PICTURE and "svg_fidelity" in exporter.heeds
+        if not wanted or picture is None or not (exporter.draw and exporter.draws(scene, options)):
+            return None
+        if len(scene.layers) <= FEW and not any(layer.falloff for layer in scene.layers):
+            return None  # plain elements, with names
+        near = _psnr_of(scene, picture)
+        for grain in USUAL:
+            drawn = self._drawn(scene, grain)
+            made = exporter.draw(drawn, options, grain)
+            wrong = 10 ** (-_psnr_of(drawn, picture) / 10) + (made.error / 255) ** 2
+            lost = near + 10 * math.log10(max(wrong, 1e-12))
+            if lost <= HARDLY:
+                return replace(
+                    made, notes=(f"{exporter.suffix[1:]}: drawn small, {_lost(lost)}", *made.notes)
+                )
+        return None
+
+    def _from_finest(
+        self, exporter: Exporter, scene: Scene, options: Options, limit: ByteLimit
+    ) -> Iterator[Callable[[], Exported]]:
+        """What may keep to a size limit."""
+        draw = exporter.draw if exporter.draw and exporter.draws(scene, options) else None
+        if draw is None or options.svg_fidelity != PICTURE:
+            yield from exporter.from_finest(scene, options)
+        if draw is None:
+            return
+        for grain in GRAINS:
+            about = draw(_rounded(scene, grain), options, grain)
+            if grain is GRAINS[-1] or limit.share(about.raw) <= ABOUT:
+                yield partial(self._draw_small, draw, scene, options, grain)
+
+    def _draw_small(
+        self, draw: Callable[[Scene, Options, Grain], Exported], scene: Scene, options: Options, grain: Grain
+    ) -> Exported:
+        made = draw(self._drawn(scene, grain), options, grain)
+        note = f"drawn small: {grain.units} steps along the shortest side, {grain.colors} of a colour"
+        return replace(made, notes=(note, *made.notes))
+
+    def _drawn(self, scene: Scene, grain: Grain) -> Scene:
+        """The scene nearest to the picture that a drawing of this grain can say; made once."""
+        if grain not in self._small:
+            self._small[grain] = _drawable(scene, self._views(scene), grain)
+        return self._small[grain]
+
+    @cached_property
+    def _small(self) -> dict[Grain, Scene]:
+        return {}
+
+    def _views(self, scene: Scene) -> Callable[[float], View]:
+        return _views_of(self.picture) if self.picture else _views_of_render(scene)
+
+
+def _lost(decibels: float) -> str:
+    return f"{decibels:.2f} dB of the picture lost" if decibels >= 0.005 else "nothing of the picture lost"
 
 
 def share_of_limit(targets: Sequence[str], options: Options) -> Callable[[Scene], float]:
-    """How much of the size limit the largest of some exports of a scene takes, each in its smallest form."""
+    """How much of the size limit the largest of some exports of a scene takes, each in a small form."""
     limit = ByteLimit.of(options.max_bytes or "")
     for target in targets:
         check_choice("target", target, EXPORTERS)
 
     def share(scene: Scene) -> float:
         exports = Exports(scene)
-        return max(limit.share(exports.smallest(target, options).raw) for target in targets)
+        return max(limit.share(exports.densest(target, options).raw) for target in targets)
 
     return share

@@ -60,6 +60,7 @@ class ExportKeywords(TypedDict, total=False):
     framing: Literal["fit", "cover", "crop"] | None
     animate: bool
     svg_profile: Literal["filters", "portable", "inkscape"]
+    svg_fidelity: Literal["picture", "render", "exact"]
     max_bytes: str | int | None
     title: str
     alt: str

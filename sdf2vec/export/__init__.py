@@ -8,6 +8,7 @@ from functools import partial
 
 from ..deferred import deferred
 from ..errors import Sdf2vecError
+from ..grain import Grain
 from ..scene import MAX_SHAPES, Scene
 from ..scene_file import FORMAT
 from .exported import MARK, Exported
@@ -20,7 +21,8 @@ class Exporter:
 
     `accepts` says which scenes `write` takes, `most_shapes` how many shapes they may have; `heeds` names the options
     that matter to it; other files that it may write end in `beside`. `forms(scene, options)`, where there are several,
-    begin with that of `write` and take ever fewer bytes; each is made when it is called. A file that ends in one of
+    begin with that of `write` and take ever fewer bytes; each is made when it is called. Where it `draws` a scene,
+    `draw` makes a small drawing of one whose numbers a grain can say (`fit.drawable`). A file that ends in one of
     `endings` is taken to be for it; one that holds `mark` was made by it. `is_text`: it writes text, not bytes;
     `is_picture`: the render.
     """
@@ -34,6 +36,8 @@ class Exporter:
     beside: tuple[str, ...] = ()
     mark: bytes = MARK.encode()
     forms: Callable[[Scene, Options], Sequence[Callable[[], Exported]]] | None = None
+    draws: Callable[[Scene, Options], bool] = lambda scene, options: False
+    draw: Callable[[Scene, Options, Grain], Exported] | None = None
     is_text: bool = True
     is_picture: bool = False
     most_shapes: Callable[[Options], int] = lambda options: MAX_SHAPES
@@ -80,9 +84,12 @@ def _shader(
 
 
 def _svg(name: str, suffix: str, about: str, endings: tuple[str, ...] = ()) -> Exporter:
-    module, heeds = "sdf2vec.export.svg", ("svg_profile", "max_bytes", "title", "alt")
+    module, heeds = "sdf2vec.export.svg", ("svg_profile", "svg_fidelity", "max_bytes", "title", "alt")
     accepts, forms = deferred(module, "accepts"), deferred(module, f"{name}_forms")
-    return Exporter(suffix, deferred(module, name), about, accepts, heeds, endings, forms=forms)
+    draws, draw = deferred(module, "draws"), deferred(module, f"small_{name}")
+    return Exporter(
+        suffix, deferred(module, name), about, accepts, heeds, endings, forms=forms, draws=draws, draw=draw
+    )
 
 
 def _raster(name: str, about: str, *endings: str) -> Exporter:

@@ -13,7 +13,8 @@ class Exported:
     """An export: its text or bytes; files that belong beside it, by what takes the place of its suffix; what was chosen
     or given up, a line each.
 
-    `error`: how far it is off from the scene by construction, at most, in 8-bit levels. `met`: whether it keeps to the
+    `error`: how far it is off from the scene by construction, in 8-bit levels: at most, of shader text; of a small
+    drawing the root mean square, about. `met`: whether it keeps to the
     size limit.
     """
 

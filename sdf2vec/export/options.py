@@ -14,6 +14,7 @@ from ..scene import Scene
 GLSL_VERSIONS = {"es300": "300 es", "330": "330", "es100": "100"}
 LAYOUTS = ("auto", "readable", "table", "tiled", "packed", "data")
 SVG_PROFILES = ("filters", "portable", "inkscape")
+PICTURE, RENDER, EXACT = SVG_FIDELITIES = ("picture", "render", "exact")
 
 
 Size = Annotated[int, number("size in pixels", "PIXELS", 1, 16384, "shortest side of a PNG, JPEG or WebP")]
@@ -45,6 +46,14 @@ class Options(Struct, frozen=True, kw_only=True):
             SVG_PROFILES,
         ),
     ] = SVG_PROFILES[0]
+    svg_fidelity: Annotated[
+        str,
+        choice(
+            "SVG fidelity",
+            "to the picture: small, and at most 0.2 dB lost; to the render; exact: without blurs",
+            SVG_FIDELITIES,
+        ),
+    ] = PICTURE
     max_bytes: (
         Annotated[
             str | int,

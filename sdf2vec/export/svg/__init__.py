@@ -12,16 +12,19 @@ from urllib.parse import quote
 from ...deferred import deferred
 from ...errors import Sdf2vecError
 from ...files import one_line
+from ...grain import Grain, is_drawable
 from ...scene import Scene
 from ..exported import MARK, Exported
-from ..options import Accepts, Options
-from .layers import drawing
-from .plan import DETAILS, Detail, Planner
-from .writer import MARGINS, Style, written
+from ..options import EXACT, Accepts, Options
+from .display import Drawing
+from .layers import drawing, drawn
+from .plan import DETAILS, DETAILS_EXACT, Detail, Planner
+from .writer import Style, written
 
 PORTABLE, INKSCAPE = "portable", "inkscape"
 IN_QUOTES = "!$'()*+,;=:@/?"  # what a URI takes as it is, but for "&", which HTML does not
 ACCEPTED = ("over",)
+SMALLER = "svg: drawn small (coordinates on a grid, few softnesses)"
 CREATED = re.compile(rb"(/CreationDate \(D:)([^)]*)")
 PRODUCER = re.compile(rb"(?<=/Producer \()(cairo [\d.]+) \(https?://cairographics\.org\)(?=\))")
 
@@ -45,13 +48,26 @@ def svg_forms(scene: Scene, options: Options) -> list[Callable[[], Exported]]:
 
 def _forms(scene: Scene, options: Options, profile: str) -> list[Callable[[], Exported]]:
     planner = _planner(scene, profile)
-    return [partial(_made, planner, detail, options) for detail in planner.details]
+    finest = [DETAILS_EXACT] if options.svg_fidelity == EXACT else []
+    return [partial(_made, planner, detail, options) for detail in (*finest, *planner.details)]
 
 
 def _made(planner: Planner, detail: Detail, options: Options) -> Exported:
     return Exported(
-        _text(planner, detail, options), notes=() if detail is DETAILS[0] else (_coarser(detail),)
+        _text(planner, detail, options),
+        notes=() if detail in (DETAILS[0], DETAILS_EXACT) else (_coarser(detail),),
     )
+
+
+def draws(scene: Scene, options: Options) -> bool:
+    """Whether there is a small drawing of a scene."""
+    return is_drawable(scene) and _planner(scene, options.svg_profile).can_be_small
+
+
+def small_svg(scene: Scene, options: Options, grain: Grain) -> Exported:
+    """A scene whose numbers a drawing of this grain can say, in the smallest text."""
+    drawing, error = drawn(scene, grain)
+    return Exported(_written(drawing, options, _small(grain)), error=error)
 
 
 def data_uri(scene: Scene, options: Options) -> Exported:
@@ -62,6 +78,11 @@ def data_uri(scene: Scene, options: Options) -> Exported:
 def data_uri_forms(scene: Scene, options: Options) -> list[Callable[[], Exported]]:
     """The same, and ever coarser drawings."""
     return [partial(_as_uri, make) for make in svg_forms(scene, options)]
+
+
+def small_data_uri(scene: Scene, options: Options, grain: Grain) -> Exported:
+    """The small drawing as a data URI."""
+    return _as_uri(partial(small_svg, scene, options, grain))
 
 
 def _as_uri(make: Callable[[], Exported]) -> Exported:
@@ -105,14 +126,20 @@ def _planner(scene: Scene, profile: str) -> Planner:
 
 
 def _text(planner: Planner, detail: Detail, options: Options) -> str:
-    grain = detail.grain
-    style = Style(detail.named, grain is not None, grain.margins if grain else MARGINS)
-    drawn = drawing(planner.scene, planner.plan(detail), detail)
-    return written(drawn, one_line(options.title), style, one_line(options.alt) if options.alt else "")
+    style = _small(detail.grain) if detail.grain else Style(detail.named)
+    return _written(drawing(planner.scene, planner.plan(detail), detail), options, style)
+
+
+def _small(grain: Grain) -> Style:
+    return Style(named=False, compact=True, filter=grain.filter)
+
+
+def _written(drawing: Drawing, options: Options, style: Style) -> str:
+    return written(drawing, one_line(options.title), style, one_line(options.alt) if options.alt else "")
 
 
 def _coarser(detail: Detail) -> str:
     if detail.grain:
-        return "svg: drawn in the smallest form (coarse coordinates, colours, blurs)"
+        return SMALLER
     blurs = f", blurs down to {detail.target:g} dB" if detail.target else ", blurs for all polygons"
     return f"svg: drawn coarser (edges to {detail.levels:g} levels{blurs})"

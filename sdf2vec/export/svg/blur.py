@@ -10,12 +10,12 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
-from functools import cache
 from typing import NamedTuple
 
 import numpy as np
 
 from ...arrays import BoolArray, Float64Array
+from ...blend import EDGE_DEVIATION
 from ...deferred import deferred
 from ...outlines import Outline
 from ...scene import Layer
@@ -23,7 +23,7 @@ from .canvas import Canvas
 from .isobands import contours
 from .outlines import Traced, core, distance_to, edge_of, sharpened
 from .refit_appearance import Difference
-from .sampling import SampleGrid, covers, distances, edge_profile, extent, grid_over
+from .sampling import SampleGrid, covers, distances, extent, grid_over
 
 SHARES = (1.0, 0.7, 0.45, 0.2)  # of the corner radius that an offset outline has
 WIDTHS = (0.9, 1.0, 1.1)  # of the Gaussian
@@ -52,14 +52,6 @@ class Blurred(NamedTuple):
     error: float
     error_cut: float
     difference: Difference
-
-
-@cache
-def deviation_of_edge() -> float:
-    """The standard deviation, in falloffs, of the logistic curve that is as steep in its middle as the edge."""
-    step = 1e-4
-    high, low = edge_profile(np.array([0.5 - step, 0.5 + step]))
-    return math.pi / math.sqrt(3.0) / 4.0 * 2.0 * step / float(high - low)
 
 
 def quantised(deviation: float) -> float:
@@ -136,7 +128,7 @@ class Trial:
             field = field + found.difference.off * deviation * math.sqrt(math.tau)
 
     def _deviation(self, width: float) -> float:
-        wanted = width * deviation_of_edge() * self.falloff * self.unit
+        wanted = width * EDGE_DEVIATION * self.falloff * self.unit
         return quantised(max(wanted, LEAST)) / self.unit
 
     def judged(self, outline: Outline | Traced, distance: Float64Array, deviation: float) -> Blurred:
@@ -156,7 +148,7 @@ class Trial:
 def trial_of(layer: Layer, canvas: Canvas, fewest: int = CELLS[0], most: int = CELLS[1]) -> Trial:
     """What blurs of a layer are compared with, on a grid with so many cells along its longest side."""
     unit, box = canvas.unit, extent(layer)
-    fine = max(deviation_of_edge() * layer.falloff, 0.5 / unit) / ACROSS
+    fine = max(EDGE_DEVIATION * layer.falloff, 0.5 / unit) / ACROSS
     grid = grid_over(box, box.longest / min(max(box.longest / fine, fewest), most))
     across = np.abs(grid.x) < canvas.width / unit / 2
     down = np.abs(grid.y) < canvas.height / unit / 2

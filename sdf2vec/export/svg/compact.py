@@ -9,42 +9,25 @@ from __future__ import annotations
 import math
 import warnings
 from collections.abc import Callable, Mapping, Sequence
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
+from ...blend import EDGE_DEVIATION
 from ...deferred import deferred
+from ...grain import Grain
 from ...outlines import EllipseOutline, Outline, PolygonOutline
 from ...scene import Layer, Scene
-from .blur import LEAST, Blurred, deviation_of_edge, nearest, trial_of
+from .blur import LEAST, Blurred, nearest, trial_of
 from .canvas import Canvas, pairs
 from .display import Figure, Geometry, moved
 from .outlines import Traced, convex, core, distance_to, edge_of, placed, sharpened
+from .refit_appearance import Difference
 from .sampling import distances
 
 TOLERANCE = 0.5  # user units that a traced contour may be off
 
 kmeans2: Callable[..., Any] = deferred("scipy.cluster.vq", "kmeans2")
-
-
-class Grain(NamedTuple):
-    """How coarse a small drawing is: `units` along the shortest side, how many `softnesses`, steps of `colors` and
-    `opacities`, `margins` of a blurred element that filters are made for, in its box.
-    """
-
-    units: int
-    softnesses: int
-    colors: int
-    opacities: int
-    margins: tuple[float, ...]
-
-
-GRAINS = (
-    Grain(512, 20, 255, 100, (0.4, 1.0, 2.0, 5.0, 20.0, 100.0)),
-    Grain(512, 10, 15, 10, (0.4, 1.0, 2.0, 5.0, 30.0)),
-    Grain(256, 10, 15, 10, (1.0, 2.0, 5.0, 30.0)),
-    Grain(160, 6, 15, 10, (1.0, 5.0, 30.0)),
-)
 
 
 def compact_blurs(
@@ -69,7 +52,7 @@ def compact_blurs(
 def softnesses(falloffs: Sequence[float], canvas: Canvas, count: int) -> list[float]:
     """For each falloff the standard deviation of its class, in scene units; 0 for none. k-means of their logarithms."""
     least = LEAST / canvas.pixels / canvas.unit
-    wanted = np.log([max(deviation_of_edge() * falloff, least) for falloff in falloffs if falloff])
+    wanted = np.log([max(EDGE_DEVIATION * falloff, least) for falloff in falloffs if falloff])
     if not wanted.size:
         return [0.0] * len(falloffs)
     first = np.unique(np.quantile(wanted, (np.arange(count) + 0.5) / count))
@@ -101,7 +84,7 @@ def _compact_blur(layer: Layer, outline: Outline, deviation: float, canvas: Canv
 def _polygon(outline: Outline, deviation: float, canvas: Canvas) -> PolygonOutline:
     """The nearest polygon with whole coordinates and rounding; of a triangle the rounding is that of its class."""
     points, own = core(outline) or (np.zeros((1, 2)), 0.0)
-    of_class = 0.5 * deviation / deviation_of_edge()  # half the falloff that a standard deviation stands for
+    of_class = 0.5 * deviation / EDGE_DEVIATION  # half the falloff that a standard deviation stands for
     wanted = of_class if isinstance(outline, PolygonOutline) else own
     rounding = round(wanted * canvas.unit) / canvas.unit
     made = PolygonOutline(pairs(points), own)
@@ -125,3 +108,25 @@ def _whole(geometry: Geometry) -> Geometry:
     radii = (max(geometry.radii[0], 1.0), max(geometry.radii[1], 1.0))
     angle = math.radians(round(math.degrees(geometry.angle)))
     return EllipseOutline(geometry.center, radii, angle)
+
+
+def drawn_difference(layer: Layer, canvas: Canvas) -> Difference:
+    """What is off about the blurred figure that a soft layer is drawn by."""
+    outline, trial = edge_of(layer, 0.5), trial_of(layer, canvas)
+    assert outline is not None
+    if isinstance(outline, EllipseOutline):
+        distance = distances(layer, trial.grid) - 0.5 * layer.falloff
+    else:
+        distance = distance_to(outline, trial.grid)
+    return trial.judged(outline, distance, EDGE_DEVIATION * layer.falloff).difference.coarse()
+
+
+def drawn_figure(layer: Layer, canvas: Canvas) -> Figure:
+    """A layer of a scene whose numbers a drawing can say, as they are."""
+    outline = edge_of(layer, 0.5)
+    assert outline is not None
+    geometry = placed(outline, canvas)
+    if (made := core(outline)) is not None:
+        points, rounding = made
+        geometry = PolygonOutline(pairs(canvas.rounded(canvas.places(points))), rounding * canvas.unit)
+    return Figure(geometry, layer.colors[0], layer.opacity, EDGE_DEVIATION * layer.falloff * canvas.unit)

@@ -10,10 +10,11 @@ from functools import cached_property
 import numpy as np
 
 from ...arrays import Float64Array
+from ...grain import GRAINS, Grain, is_drawable
 from ...scene import Layer, Scene
 from .blur import Blurred, best_blur
 from .canvas import Canvas
-from .compact import GRAINS, Grain, compact_blurs
+from .compact import compact_blurs
 from .gradient_stops import stop_count
 from .isobands import band_count
 from .outlines import edge_of
@@ -42,6 +43,7 @@ class Detail:
     grain: Grain | None = None
 
 
+DETAILS_EXACT = Detail(target=math.inf, levels=0.1)  # no blurs
 # From what looks like the render to what is small. Names go last, for they are what a person edits by.
 DETAILS = (
     Detail(),
@@ -93,6 +95,11 @@ class Planner:
         softest = SHARP * min(1.0, side / SMALL)
         self.soft = [layer.falloff * side > softest for layer in self.scene.layers]
 
+    @property
+    def can_be_small(self) -> bool:
+        """Whether there may be blurs wherever a small drawing needs them."""
+        return self.filters or not any(self.soft)
+
     @cached_property
     def samples(self) -> LayerSamples:
         return layers_at(self.scene)
@@ -120,9 +127,9 @@ class Planner:
 
     @property
     def details(self) -> list[Detail]:
-        """The details that a drawing may have, finest first."""
+        """The details that a drawing may have, finest first; small ones of what is drawable are fitted (`drawn`)."""
         patches = any(layer.is_patch for layer in self.scene.layers)
-        compact = (self.filters or not any(self.soft)) and not patches
+        compact = self.can_be_small and not patches and not is_drawable(self.scene)
         return [detail for detail in DETAILS if compact or not detail.grain]
 
     def plan(self, detail: Detail) -> Plan:

@@ -55,6 +55,13 @@ class Difference(NamedTuple):
         return Difference(SampleGrid(x, y, step * block), means)
 
 
+class Refitted(NamedTuple):
+    """A scene and the mean squared error of its drawing, about."""
+
+    scene: Scene
+    error: float = 0.0
+
+
 def refitted(
     scene: Scene,
     samples: LayerSamples,
@@ -62,7 +69,7 @@ def refitted(
     cut: Sequence[int] = (),
     colors: int = 0,
     opacities: int = 0,
-) -> Scene:
+) -> Refitted:
     """The scene with the colours and opacities whose drawing is nearest to the scene's render.
 
     `drawn`: what is off about the layers that are not drawn exactly. `cut`: layers whose alpha renderers round down
@@ -70,14 +77,16 @@ def refitted(
     so that the error of one makes up for another's. 0 leaves them free. Only `over`.
     """
     if not 0 < len(scene.layers) <= LARGEST or not (drawn or cut or colors):
-        return scene
+        return Refitted(scene)
     stack, wanted = _stack(scene, samples, drawn, cut)
     best, least = stack, stack.error(wanted)
     for _ in range(ROUNDS if drawn or cut else 0):
         stack = stack.with_opacities(wanted).with_colors(wanted)
         if (error := stack.error(wanted)) < least:
             best, least = stack, error
-    return best.rounded(wanted, colors, opacities).painted(scene) if colors else best.painted(scene)
+    if colors:
+        best = best.rounded(wanted, colors, opacities)
+    return Refitted(best.painted(scene), best.error(wanted))
 
 
 @dataclass(frozen=True)

@@ -41,7 +41,27 @@ NEEDLESS = ("version", "baseProfile", "xmlns:ev", "xmlns:xlink")  # that svgwrit
 SHARED = ("fill", "fill-rule", "shape-rendering")  # attributes that a group says for all its items
 REACH = 3.0  # standard deviations that a blur reaches
 FLAT = 0.05  # user units: a rounding below it is none
-MARGINS = (0.1, 0.2, 0.3, 0.45, 0.6, 0.8, 1.1, 1.5, 2.0, 3.0, 4.5, 7.0, 10.0, 20.0, 50.0, 100.0)
+MARGINS = (
+    0.1,
+    0.2,
+    0.3,
+    0.45,
+    0.6,
+    0.8,
+    1.1,
+    1.5,
+    2.0,
+    3.0,
+    4.5,
+    7.0,
+    10.0,
+    20.0,
+    50.0,
+    100.0,
+    200.0,
+    500.0,
+    1000.0,
+)
 STROKES = {"fill": "currentColor", "stroke": "currentColor", "stroke-width": "0", "stroke-linejoin": "round"}
 
 
@@ -50,12 +70,12 @@ class Style:
     """How a drawing is written. `named`: with the figures' names as ids.
 
     `compact`: each figure with as few words as there are. Colour is `currentColor`, said once, the softness a class,
-    a polygon's rounding a stroke. `margins`: of filters, in shares of the element's box.
+    a polygon's rounding a stroke. One more filter is worth blurring the share `filter` of the canvas' pixels in vain.
     """
 
     named: bool = True
     compact: bool = False
-    margins: Sequence[float] = MARGINS
+    filter: float = 0.2
 
 
 def written(drawing: Drawing, title: str, style: Style, alt: str = "") -> str:
@@ -84,6 +104,7 @@ class _Writer:
         self.ids: dict[str, str] = {}
         self.classes: dict[str, str] = {}
         self.roundings = _usual_roundings(drawing.items)
+        self.margins = _margins(drawing, style.filter) if style.compact else {}
 
     def text(self) -> str:
         """The document without its title, ids with PREFIX."""
@@ -131,7 +152,7 @@ class _Writer:
         stroke = self.number(2.0 * rounding) if rounding else None
         if figure.blur:
             usual = stroke and rounding == self.roundings.get(figure.blur)
-            rule = f";stroke-width:{stroke}" if usual else ""
+            rule = f";stroke-width:{self.fine(2.0 * rounding)}" if usual else ""
             look["class"] = self._class(f"filter:{self._filter(figure)}{rule}")
             stroke = None if usual else stroke
         return look | {"stroke-width": stroke}
@@ -209,14 +230,11 @@ class _Writer:
     def _margins(self, figure: Figure) -> tuple[float, float]:
         """How far a blur reaches beyond an element's box, in its sides."""
         rounding = _rounding(figure)
-        grown, stroked = (0.0, rounding) if self.style.compact else (rounding, 0.0)
-        wanted = (REACH * figure.blur + stroked) / np.maximum(box_of(figure.geometry) + 2.0 * grown, 0.1)
-        across, down = (self._margin(share) for share in wanted.tolist())
-        return (max(across, down),) * 2 if self.style.compact else (across, down)
-
-    def _margin(self, share: float) -> float:
-        margins = self.style.margins
-        return next((step for step in margins if step >= share), margins[-1])
+        if self.style.compact:
+            return (_least(self.margins[figure.blur], float(_margin(figure, rounding).max())),) * 2
+        wanted = REACH * figure.blur / np.maximum(box_of(figure.geometry) + 2.0 * rounding, 0.1)
+        across, down = (_least(MARGINS, share) for share in wanted.tolist())
+        return across, down
 
     def _defined(self, letter: str, definition: Element) -> str:
         """A reference to a definition; the same one as before for equal content."""
@@ -320,6 +338,43 @@ class _Writer:
 
 def _rounding(figure: Figure) -> float:
     return figure.geometry.rounding if isinstance(figure.geometry, PolygonOutline) else 0.0
+
+
+def _margin(figure: Figure, rounding: float) -> Points:
+    """How far a blurred element reaches beyond its box [2], in its sides, where its rounding is a stroke."""
+    return np.asarray((REACH * figure.blur + rounding) / np.maximum(box_of(figure.geometry), 0.1))
+
+
+def _least(margins: Sequence[float], share: float) -> float:
+    return next((step for step in margins if step >= share), margins[-1])
+
+
+def _margins(drawing: Drawing, worth: float) -> dict[float, tuple[float, ...]]:
+    """For each blur the margins of its filters: as few as the pixels that a renderer blurs in vain are worth."""
+    figures = [item for item in drawing.items if isinstance(item, Figure) and item.blur]
+    by_blur: dict[float, list[Figure]] = {}
+    for figure in figures:
+        by_blur.setdefault(figure.blur, []).append(figure)
+    canvas = drawing.width * drawing.height
+    return {blur: _shared_margins(members, canvas, worth) for blur, members in by_blur.items()}
+
+
+def _shared_margins(figures: Sequence[Figure], canvas: float, worth: float) -> tuple[float, ...]:
+    """The margins of some figures of one blur, each shared by figures that want nearly as much; the cheapest ones.
+
+    By dynamic programming over the figures in the order of what they want: of each run the largest.
+    """
+    wanted = sorted(((float(_margin(f, _rounding(f)).max()), f) for f in figures), key=lambda pair: pair[0])
+    steps = [_least(MARGINS, share) for share, _ in wanted]
+    boxes = np.array([np.maximum(box_of(figure.geometry), 0.1) for _, figure in wanted])
+    cheapest: list[tuple[float, tuple[float, ...]]] = [(0.0, ())]
+    for end in range(1, len(steps) + 1):
+        regions = np.minimum(np.prod(boxes[:end] * (1.0 + 2.0 * steps[end - 1]), axis=1), canvas)
+        costs = np.cumsum(regions[::-1])[::-1] + worth * canvas
+        found = [(cheapest[start][0] + costs[start], start) for start in range(end)]
+        cost, start = min(found)
+        cheapest.append((cost, (*cheapest[start][1], steps[end - 1])))
+    return cheapest[-1][1]
 
 
 def _usual_roundings(items: Sequence[Item]) -> dict[float, float]:

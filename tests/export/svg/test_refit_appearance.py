@@ -16,7 +16,7 @@ from tests.export.svg.drawings import BLURRING, Parameters, decibels, off_in, te
 
 
 def refitted_at(scene, *arguments):
-    return refitted(scene, layers_at(scene), *arguments)
+    return refitted(scene, layers_at(scene), *arguments).scene
 
 
 def disc(opacity=0.5, color=(0.2, 0.4, 0.6)):

@@ -1,0 +1,41 @@
+"""How coarse a small drawing is, and which scenes it can draw as they are."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+from .blend import OVER
+from .layer import is_flat
+from .scene import Scene
+
+KINDS = ("triangle", "box", "circle")  # that a blurred element draws as the render does
+
+
+class Grain(NamedTuple):
+    """How coarse a small drawing is: `units` along the shortest side, how many `softnesses` of two pixels and more,
+    steps of `colors` and `opacities`. One more filter is worth blurring this share of the canvas' pixels in vain.
+    """
+
+    units: int
+    softnesses: int
+    colors: int
+    opacities: int
+    filter: float
+
+
+GRAINS = (  # finest first
+    Grain(1024, 20, 255, 100, 0.2),
+    Grain(512, 12, 255, 20, 0.2),
+    Grain(256, 8, 51, 10, 0.3),
+    Grain(160, 3, 15, 10, 0.5),
+)
+DENSE = GRAINS[2]  # more shapes of it say more of a picture than fewer finer ones, or yet more coarser ones
+USUAL = GRAINS[1::-1]  # what is tried where no size is asked for, smallest first
+
+
+def is_drawable(scene: Scene) -> bool:
+    """Whether all of a scene's layers are single shapes of one colour that a blurred element can draw."""
+    return scene.compositing == OVER and all(
+        len(layer.shapes) == 1 and layer.shapes[0].kind in KINDS and is_flat(layer.structure)
+        for layer in scene.layers
+    )

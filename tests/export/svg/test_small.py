@@ -1,0 +1,90 @@
+"""Small drawings of scenes whose numbers they can say, and when one is chosen."""
+
+import gzip
+from xml.etree import ElementTree
+
+import numpy as np
+import pytest
+
+from sdf2vec import export, exported, fit
+from sdf2vec.engines import ENGINES
+from sdf2vec.export.options import Options
+from sdf2vec.export.svg import small_svg
+from sdf2vec.fit.drawable import rounded
+from sdf2vec.grain import GRAINS
+from sdf2vec.image import load, premultiply
+from sdf2vec.quality import psnr_of
+from sdf2vec.render.draw import draw
+from tests.export.svg.drawings import NAMESPACE
+from tests.fit.test_drawable import of_kinds
+
+
+@pytest.fixture(scope="module")
+def picture():
+    """Soft discs and a sharp edge, not square."""
+    x, y = np.meshgrid(np.linspace(-1.5, 1.5, 150), np.linspace(-1, 1, 100))
+    disc = np.exp(-3 * ((x - 0.4) ** 2 + y**2))
+    return np.stack([disc, 0.2 + 0.6 * (x + y > 0), np.clip(0.5 + 0.3 * y, 0, 1)], axis=2).astype(np.float32)
+
+
+@pytest.fixture(scope="module")
+def scene(picture):
+    return fit(picture, 12, preset="fast", kind="triangle")
+
+
+def drawn_by(engine, text, width, height):
+    return premultiply(ENGINES[engine].render(text, width, height))[..., :3]
+
+
+@pytest.mark.parametrize("engine", ["resvg", "chromium"])
+@pytest.mark.parametrize("grain", GRAINS[:3], ids=lambda grain: str(grain.units))
+def test_it_is_drawn_as_it_was_fitted(engine, grain, require_engine):
+    """Triangles, boxes and circles of all softnesses, at the size fitted and at a larger one."""
+    require_engine(engine)
+    scene = rounded(of_kinds(width=150, height=100), grain)
+    text = str(small_svg(scene, Options(), grain).data)
+    for width, height in ((150, 100), (330, 220)):
+        wanted = draw(scene, width, height).permute(1, 2, 0).numpy()[..., :3]
+        off = drawn_by(engine, text, width, height) - wanted
+        assert -10 * np.log10(np.mean(off**2)) > 30
+        assert abs(255 * off.mean()) < 1.5
+
+
+def test_the_picture_decides(scene, picture):
+    """Of a fit whose picture is given a small drawing, which loses hardly anything of it; else one like the render."""
+    small, like_render = exported(scene, "svg", picture=picture), exported(scene, "svg")
+    (note,) = small.notes
+    assert "drawn small" in note
+    assert not like_render.notes
+    assert len(gzip.compress(small.raw)) < 0.4 * len(gzip.compress(like_render.raw))
+    for fidelity in ("render", "exact"):
+        assert "drawn small" not in str(exported(scene, "svg", picture=picture, svg_fidelity=fidelity).notes)
+
+
+def test_little_of_the_picture_is_lost(scene, picture, require_engine):
+    require_engine("resvg")
+    text = str(export(scene, "svg", picture=picture))
+    off = drawn_by("resvg", text, 150, 100) - picture
+    assert -10 * np.log10(np.mean(off**2)) > psnr_of(scene, load(picture)) - 0.6
+
+
+def test_exact_is_without_blurs(scene):
+    assert "feGaussianBlur" not in str(export(scene, "svg", svg_fidelity="exact"))
+    assert "feGaussianBlur" in str(export(scene, "svg"))
+
+
+def test_limits_are_kept_from_fine_to_coarse(scene, picture):
+    """The finest small drawing that fits; each has whole coordinates on a grid of its own."""
+    grids = []
+    for limit in ("1500gz", "900gz", "700gz"):
+        made = exported(scene, "svg", picture=picture, max_bytes=limit)
+        assert made.met == (len(gzip.compress(made.raw, 9)) <= int(limit[:-2]))
+        root = ElementTree.fromstring(str(made.data))
+        grids.append(float(root.get("viewBox", "").split()[3]))
+        assert not any("." in path.get("d", "") for path in root.iter(f"{NAMESPACE}path"))
+    assert grids == sorted(grids, reverse=True)
+    assert grids[0] > grids[-1]
+
+
+def test_as_a_data_uri(scene, picture):
+    assert len(export(scene, "data-uri", picture=picture)) < 0.4 * len(export(scene, "data-uri"))
