@@ -57,6 +57,16 @@ def rounded(values: F32[1], side: I64, out: I64[1]) -> F64:
 
 
 @kernel
+def total(numbers: I32[1], places: I64[1]) -> I64:
+    """Small integers, which may be negative."""
+    found = 0
+    for i in range(numbers.size):
+        places[i] = numbers[i]
+        found += numbers[i]
+    return found
+
+
+@kernel
 def sums(table: F32[2], out: F32[1]):
     """Room of its own."""
     line = empty(SIDE)
@@ -73,6 +83,7 @@ CUBE = R.standard_normal((3, 3, 4)).astype(np.float32)
 GIVEN = {
     "rows": (rows, (TABLE, np.float32(0.9), np.zeros(4), np.zeros(4, np.int32))),
     "fills": (fills, (CUBE, np.zeros_like(CUBE))),
+    "total": (total, (np.array([3, -5, -(2**31)], np.int32), np.zeros(3, np.int64))),
     "rounded": (rounded, (TABLE.ravel(), 7, np.zeros(TABLE.size, np.int64))),
 }
 
