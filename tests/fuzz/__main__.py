@@ -7,7 +7,6 @@ import time
 
 from tests.fuzz.attacks import ATTACKS, attempt
 
-
 LONGEST = 20.0  # CPU seconds that a scene's export may take
 
 

@@ -83,7 +83,7 @@ CUBE = R.standard_normal((3, 3, 4)).astype(np.float32)
 GIVEN = {
     "rows": (rows, (TABLE, np.float32(0.9), np.zeros(4), np.zeros(4, np.int32))),
     "fills": (fills, (CUBE, np.zeros_like(CUBE))),
-    "total": (total, (np.array([3, -5, -(2**31)], np.int32), np.zeros(3, np.int64))),
+    "total": (total, (np.array([3, -5, -70], np.int32), np.zeros(3, np.int64))),
     "rounded": (rounded, (TABLE.ravel(), 7, np.zeros(TABLE.size, np.int64))),
 }
 
