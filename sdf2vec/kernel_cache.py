@@ -49,7 +49,8 @@ class Entry(NamedTuple):
     @property
     def address(self) -> int:
         """Where its machine code is, from now on."""
-        return self.assembly.address(self.name)
+        with _compiling:
+            return _address(self)
 
 
 @dataclass(frozen=True)
@@ -60,12 +61,6 @@ class Assembly:
 
     def __getitem__(self, name: str) -> Entry:
         return Entry(self, name)
-
-    def address(self, name: str) -> int:
-        """Where a function is in this process."""
-        with _compiling:
-            _add(self)
-            return int(_machine().get_function_address(f"{self.stem}.{name}"))
 
     @property
     def is_kept(self) -> bool:
@@ -116,7 +111,7 @@ class Kernel:
         types = [each for kind in self.arguments.values() for each in _c_types(kind)]
         result = result_of(self.py_func)
         prototype = ctypes.CFUNCTYPE(C_TYPES[result.dtype] if result else None, *types)
-        return prototype(self.assembly.address(self.py_func.__name__))
+        return prototype(self.assembly[self.py_func.__name__].address)
 
     def __call__(self, *given: Any) -> Any:
         parts: list[Any] = []
@@ -168,6 +163,12 @@ def _machine() -> Any:
     """What holds the machine code of this process."""
     target = _target_machine()
     return binding.create_mcjit_compiler(binding.parse_assembly(""), target)
+
+
+@cache
+def _address(entry: Entry) -> int:
+    _add(entry.assembly)
+    return int(_machine().get_function_address(f"{entry.assembly.stem}.{entry.name}"))
 
 
 @cache
