@@ -6,13 +6,13 @@ from ..lower.loops import F32, I64, f32
 
 @kernel
 def chains(x: F32[1], rounds: I64):
-    """Eight chains of multiply-adds that don't wait."""
-    scale, shift = f32(0.999), f32(0.001)
+    """Eight chains of multiply-adds that don't wait, and that can't be shortened; x stays near 0.28."""
+    few, shift, share = f32(0.001), f32(0.2), f32(0.125)
     for _ in range(rounds):
         for i in range(x.size):
-            a, b, c, d = x[i], x[i] + shift, x[i] - shift, x[i] * scale
-            e, f, g, h = a - scale, b - scale, c - scale, d - scale
+            a, b, c, d = x[i], x[i] + few, x[i] - few, x[i] * share
+            e, f, g, h = a - shift, b - shift, c - shift, d - shift
             for _ in range(16):
-                a, b, c, d = a * scale + shift, b * scale + shift, c * scale + shift, d * scale + shift
-                e, f, g, h = e * scale + shift, f * scale + shift, g * scale + shift, h * scale + shift
-            x[i] = ((a + b) + (c + d)) + ((e + f) + (g + h))
+                a, b, c, d = a * a + shift, b * b + shift, c * c + shift, d * d + shift
+                e, f, g, h = e * e + shift, f * f + shift, g * g + shift, h * h + shift
+            x[i] = ((a + b) + (c + d) + (e + f) + (g + h)) * share
