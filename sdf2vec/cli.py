@@ -290,7 +290,7 @@ def _cache_command(arguments: list[str]) -> int:
 
 
 def _warm_up_command(arguments: list[str]) -> int:
-    about = "Compiles the kernels of every kind of shape, so that no fit has to: some minutes, once."
+    about = "Compiles the kernels of every kind of shape, so that no fit has to: half a minute, once."
     return warming.command(_Parser(prog="sdf2vec --warm-up", description=about), arguments)
 
 

@@ -1,110 +1,202 @@
 """How kernels for the CPU are compiled, and where their machine code is kept: the user's cache folder.
 
-`kernel` compiles what Python calls, `entry` what kernels `call` by its address, so that they need not be compiled
-with it, and `inlined` what both are made of. Machine code is found again by a
-fingerprint of all that was compiled into it, so that a kernel may call what another module defines; numba's own
-`cache=True` looks at one file's time of change only. Where the folder can't be written to, kernels are compiled anew
-in every run, with one warning.
+Functions come as text, `Assembly`, made of formulas (`lower.llvm`) or of plain Python (`lower.loops`, by the decorator
+`kernel`); LLVM compiles it for this machine when it is first needed. Machine code is found again by a hash of the text
+and of what compiles it. Where the folder can't be written to, kernels are compiled anew in every run, with one warning.
 """
 
 from __future__ import annotations
 
+import ctypes
 import hashlib
 import importlib.util
-import pickle
 import sys
 import warnings
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cache, cached_property
 from pathlib import Path
 from tempfile import TemporaryDirectory
+from threading import RLock
 from types import FunctionType, ModuleType
-from typing import Any
+from typing import Any, NamedTuple
 
 import llvmlite
-import numba
-import numpy as np
-from llvmlite import ir
-from numba import types
-from numba.core import caching, ccallback, compiler, serialize
-from numba.extending import intrinsic
+from llvmlite import binding
 
 from .cached import cache_folder, read_kept, trim
 from .errors import Sdf2vecError, Sdf2vecWarning
 from .files import write_atomically
+from .lower.llvm import assembled
+from .lower.loops import Kind, arguments_of, result_of, text_of
 
-FLAGS: dict[str, Any] = {
-    "fastmath": {"reassoc", "nsz", "arcp", "contract", "afn"},
-    "error_model": "numpy",  # what lets LLVM vectorise divisions
-    "nogil": True,
-}
-UNWRAPPED: dict[str, Any] = {"no_cfunc_wrapper": True}  # nothing calls it from C
 DIGEST = hashlib.sha256().digest_size
-
-inlined: Callable[[Callable[..., Any]], Any] = numba.njit(**FLAGS, forceinline=True)
-
-
-def kernel(function: FunctionType) -> Any:
-    """Decorator: compiled when first called; the machine code is kept.
-
-    What it calls is to be `inlined`: were that kept, too, a fresh compilation and one from disk could link different
-    copies of a function, which differ in the last digits.
-    """
-    dispatcher: Any = numba.njit(**FLAGS, **UNWRAPPED)(function)
-    dispatcher._cache = _Kept(function)
-    return dispatcher
+C_TYPES: dict[str, Any] = {
+    "float32": ctypes.c_float,
+    "float64": ctypes.c_double,
+    "int32": ctypes.c_int32,
+    "int64": ctypes.c_int64,
+}
+_compiling = RLock()
 
 
-@dataclass(frozen=True)
-class Entry:
-    """A function that kernels call by its address: compiled when that is first asked for; its machine code is kept."""
+class Entry(NamedTuple):
+    """A function of an assembly."""
 
-    py_func: FunctionType
-    signature: Any
+    assembly: Assembly
+    name: str
 
     @property
     def address(self) -> int:
-        return int(self._compiled.address)
+        """Where its machine code is, from now on."""
+        with _compiling:
+            return _address(self)
+
+
+@dataclass(frozen=True)
+class Assembly:
+    """Functions in LLVM's assembly language: compiled when an address is first asked for; machine code is kept."""
+
+    text: str
+
+    def __getitem__(self, name: str) -> Entry:
+        return Entry(self, name)
+
+    @property
+    def is_kept(self) -> bool:
+        """Whether it has been compiled before on this machine."""
+        return self.path.exists()
 
     @cached_property
-    def _compiled(self) -> Any:
-        signature = self.signature.args, self.signature.return_type
-        function: Any = ccallback.CFunc(self.py_func, signature, {}, FLAGS)
-        function._cache = _Kept(self.py_func)
-        function.compile()
-        return function
+    def stem(self) -> str:
+        """What the names of its functions begin with: all functions of a process are in one list."""
+        return f"sdf2vec.{_hash(llvmlite.__version__, binding.llvm_version_info, *_processor(), self.text)}"
+
+    @property
+    def path(self) -> Path:
+        """Where its machine code is kept."""
+        return cache_folder() / f"{self.stem}.kernel"
+
+    def code(self) -> bytes:
+        """The machine code: what is kept, or compiled now."""
+        return _read(self.path) or self._compiled()
+
+    def _compiled(self) -> bytes:
+        module = binding.parse_assembly(self.text)
+        for function in module.functions:
+            if not function.is_declaration:
+                function.name = f"{self.stem}.{function.name}"
+        target = _target_machine()
+        builder = binding.create_pass_builder(target, _tuning())
+        builder.getModulePassManager().run(module, builder)
+        code: bytes = target.emit_object(module)
+        _keep(self.path, code)
+        return code
 
 
-def entry(*arguments: Any) -> Callable[[FunctionType], Entry]:
-    """Decorator: an `Entry` that takes arguments of these types and returns nothing; arrays as pointers to their
-    first number."""
-    return lambda function: Entry(function, types.void(*arguments))
+class Kernel:
+    """A function that is compiled when it is first called, for arguments of the kinds that it states."""
+
+    def __init__(self, function: FunctionType) -> None:
+        self.py_func = function
+        self.arguments = arguments_of(function)
+
+    @cached_property
+    def assembly(self) -> Assembly:
+        """The function alone."""
+        return Assembly(assembled([text_of(self.py_func)]))
+
+    @cached_property
+    def _compiled(self) -> Callable[..., Any]:
+        types = [each for kind in self.arguments.values() for each in _c_types(kind)]
+        result = result_of(self.py_func)
+        prototype = ctypes.CFUNCTYPE(C_TYPES[result.dtype] if result else None, *types)
+        return prototype(self.assembly[self.py_func.__name__].address)
+
+    def __call__(self, *given: Any) -> Any:
+        parts: list[Any] = []
+        for (name, kind), value in zip(self.arguments.items(), given, strict=True):
+            if not kind.dimensions:
+                parts.append(value)
+            elif value.dtype == kind.dtype and value.ndim == kind.dimensions and value.flags.c_contiguous:
+                parts += value.__array_interface__["data"][0], *value.shape
+            else:
+                raise TypeError(f"{name}: {kind} wanted, got {value.dtype} {value.shape} {value.strides}")
+        return self._compiled(*parts)
 
 
-@intrinsic
-def call(_: Any, address: Any, arguments: Any) -> Any:
-    """Calls the `Entry` at an address with a tuple of arguments, whose types have to be as it was declared with."""
+def kernel(function: Any) -> Kernel:
+    """Decorator: what of Python it may be made of says `lower.loops`."""
+    return Kernel(function)
 
-    def generate(context: Any, builder: Any, signature: Any, values: Any) -> Any:
-        given = [builder.extract_value(values[1], index) for index in range(len(arguments))]
-        for index, kind in enumerate(arguments):
-            if isinstance(kind, types.Array):
-                given[index] = context.make_array(kind)(context, builder, given[index]).data
-        result = context.get_value_type(signature.return_type)
-        function = ir.FunctionType(result, [value.type for value in given])
-        return builder.call(builder.inttoptr(values[0], function.as_pointer()), given)
 
-    return types.void(address, arguments), generate
+def _c_types(kind: Kind) -> list[Any]:
+    if not kind.dimensions:
+        return [C_TYPES[kind.dtype]]
+    return [ctypes.c_void_p, *[ctypes.c_int64] * kind.dimensions]
+
+
+# --- LLVM ---------------------------------------------------------------------------------------------------
 
 
 @cache
-def load(source: str) -> ModuleType:
-    """The module of this text. Its kernels are compiled when they are first called."""
-    module = ModuleType(f"sdf2vec_{_hash(source)}")
-    sys.modules[module.__name__] = module  # numba looks there for the module of what it has kept
-    exec(compile(source, module.__name__, "exec"), module.__dict__)
-    return module
+def _processor() -> tuple[str, str]:
+    """Its name, and what it can do."""
+    return binding.get_host_cpu_name(), binding.get_host_cpu_features().flatten()
+
+
+def _target_machine() -> Any:
+    binding.initialize_native_target()
+    binding.initialize_native_asmprinter()
+    name, features = _processor()
+    return binding.Target.from_default_triple().create_target_machine(name, features, opt=3, jit=True)
+
+
+def _tuning() -> Any:
+    tuning = binding.create_pipeline_tuning_options(speed_level=3)
+    tuning.loop_vectorization = True
+    return tuning
+
+
+@cache
+def _machine() -> Any:
+    """What holds the machine code of this process."""
+    target = _target_machine()
+    return binding.create_mcjit_compiler(binding.parse_assembly(""), target)
+
+
+@cache
+def _address(entry: Entry) -> int:
+    _add(entry.assembly)
+    return int(_machine().get_function_address(f"{entry.assembly.stem}.{entry.name}"))
+
+
+@cache
+def _add(assembly: Assembly) -> None:
+    """To the functions of this process."""
+    _machine().add_object_file(binding.ObjectFileRef.from_data(assembly.code()))
+    _machine().finalize_object()
+
+
+# --- what is kept -------------------------------------------------------------------------------------------
+
+
+def _read(path: Path) -> bytes:
+    """What `_keep` has written; nothing where there is no file, or it is damaged, or may be somebody else's."""
+    try:
+        data = read_kept(path)
+    except OSError:
+        return b""
+    return data[DIGEST:] if hashlib.sha256(data[DIGEST:]).digest() == data[:DIGEST] else b""
+
+
+def _keep(path: Path, code: bytes) -> None:
+    """Writes a digest and machine code."""
+    try:
+        write_atomically(path, hashlib.sha256(code).digest() + code)
+        trim()
+    except (Sdf2vecError, OSError):
+        _warn_once(cache_folder())
 
 
 @cache
@@ -128,64 +220,6 @@ def load_file(source: str) -> ModuleType:
     sys.modules[path.stem] = module
     spec.loader.exec_module(module)
     return module
-
-
-def is_compiled(dispatcher: Any) -> bool:
-    """Whether a kernel has been compiled before on this machine."""
-    return any(cache_folder().glob(f"{_stem(dispatcher.py_func)}-*"))
-
-
-class _Kept(caching.NullCache):
-    """The machine code of one kernel, a file for each signature: a digest, then what numba makes of it."""
-
-    def __init__(self, function: FunctionType) -> None:
-        self.function = function
-
-    def load_overload(self, signature: object, target: Any) -> Any:
-        """What was compiled for a signature; None where there is nothing, or it is damaged, or made of a module whose
-        name is another now: a remark in generated text is enough for that."""
-        target.refresh()
-        try:
-            data = read_kept(self._path(signature, target.codegen()))
-            if hashlib.sha256(data[DIGEST:]).digest() != data[:DIGEST]:
-                return None
-            return compiler.CompileResult._rebuild(target, *pickle.loads(data[DIGEST:]))
-        except Exception:  # whatever it is, compiling mends it
-            return None
-
-    def save_overload(self, signature: object, compiled: Any) -> None:
-        """Keeps what was compiled for a signature."""
-        data = serialize.dumps(compiled._reduce())
-        try:
-            path = self._path(signature, compiled.codegen)
-            write_atomically(path, hashlib.sha256(data).digest() + data)
-            trim()
-        except (Sdf2vecError, OSError):
-            _warn_once(cache_folder())
-
-    def _path(self, signature: object, codegen: Any) -> Path:
-        name = f"{_stem(self.function)}-{_hash(signature, codegen.magic_tuple())}.kernel"
-        return cache_folder() / name
-
-
-@cache
-def _stem(function: FunctionType) -> str:
-    """How the files of a kernel begin; differs where what was compiled, or what compiles, differs."""
-    versions = numba.__version__, llvmlite.__version__, np.__version__, sys.version
-    flags = sorted(map(str, FLAGS["fastmath"]))
-    return f"{function.__module__}.{function.__name__}-{_hash(*versions, *flags, *_parts(function))}"
-
-
-def _parts(function: FunctionType) -> Iterator[object]:
-    """The code and the constants of a function and of all compiled ones that it calls."""
-    code = function.__code__
-    yield from (code.co_code, code.co_consts, code.co_names)
-    for name in code.co_names:
-        value: Any = function.__globals__.get(name)
-        if isinstance(value, (bool, int, float, tuple, np.generic, np.ndarray)):
-            yield from (np.asarray(value).dtype, np.asarray(value).tolist())
-        elif hasattr(value, "py_func"):
-            yield from _parts(value.py_func)
 
 
 def _hash(*parts: object) -> str:

@@ -3,25 +3,29 @@
 import os
 import subprocess
 import sys
-from types import FunctionType
 
-import numpy as np
 import pytest
 
-from sdf2vec import kernel_cache
 from sdf2vec.cached import cache_folder, files, trim
+from sdf2vec.kernel_cache import Assembly
 from sdf2vec.layer import Part
 from sdf2vec.render import kernels
 
 RUN = """
-import warnings
+import sys, warnings
 warnings.simplefilter("always")
+import numpy as np
 from sdf2vec import kernel_cache
-from sdf2vec.layer import Part
-source = "from sdf2vec.kernel_cache import kernel\\n@kernel\\ndef f(x):\\n    return x + 1\\n"
-module, other = kernel_cache.load(source), kernel_cache.load(source.replace("+ 1", "+ 2"))
-before = kernel_cache.is_compiled(module.f)
-print(module.f(1), other.f(1), before, kernel_cache.is_compiled(module.f), len(module.f.stats.cache_hits))
+from sdf2vec.kernel_cache import Assembly
+from sdf2vec.lower.llvm import assembled
+kernel_cache.Assembly._compiled = lambda self, made=Assembly._compiled: compiled.append(self) or made(self)
+compiled, text = [], "define i64 @f() {\\n  ret i64 2\\n}"
+one, other = (Assembly(assembled([each])) for each in (text, text.replace("2", "3")))
+before = one.is_kept
+import ctypes
+def call(assembly):
+    return ctypes.CFUNCTYPE(ctypes.c_int64)(assembly["f"].address)()
+print(call(one), call(other), call(one), before, one.is_kept, len(compiled))
 """
 
 
@@ -33,57 +37,38 @@ def run(script, folder, *arguments):
 
 
 def test_kernels_are_kept_in_the_cache_folder(tmp_path):
-    assert run(RUN, tmp_path / "new").stdout.split() == ["2", "3", "False", "True", "0"]
+    assert run(RUN, tmp_path / "new").stdout.split() == ["2", "3", "2", "False", "True", "2"]
     assert len(list((tmp_path / "new").glob("*.kernel"))) == 2
-    assert run(RUN, tmp_path / "new").stdout.split() == ["2", "3", "True", "True", "1"]
+    assert run(RUN, tmp_path / "new").stdout.split() == ["2", "3", "2", "True", "True", "0"]
 
 
 @pytest.mark.parametrize(
     "damage", [lambda data: b"", lambda data: data[:-9] + b"x" * 9], ids=["empty", "overwritten"]
 )
 def test_damaged_machine_code_is_compiled_anew(tmp_path, damage):
-    first = run(RUN, tmp_path).stdout
+    run(RUN, tmp_path)
     for path in tmp_path.glob("*.kernel"):
         path.write_bytes(damage(path.read_bytes()))
     result = run(RUN, tmp_path)
-    assert result.stdout.split()[:2] == first.split()[:2]
+    assert result.stdout.split() == ["2", "3", "2", "True", "True", "2"]
     assert result.stderr == ""
-    assert run(RUN, tmp_path).stdout.split()[-1] == "1"  # it was kept again
-
-
-CALLS_A_MODULE = """
-import sys
-from sdf2vec import kernel_cache
-source = "from sdf2vec.kernel_cache import inlined\\n@inlined\\ndef twice(x):\\n    return 2 * x\\n"
-twice = kernel_cache.load(source + sys.argv[1]).twice
-@kernel_cache.kernel
-def f(x):
-    return twice(x)
-print(f(1), len(f.stats.cache_hits))
-"""
-
-
-def test_machine_code_of_a_module_that_is_gone_is_compiled_anew(tmp_path):
-    """Another version's text may say the same in other words: the module has another name then."""
-    runs = [run(CALLS_A_MODULE, tmp_path, remark).stdout.split() for remark in ("", "", "# other", "# other")]
-    assert runs == [["2", "0"], ["2", "1"], ["2", "0"], ["2", "1"]]
+    assert run(RUN, tmp_path).stdout.split()[-1] == "0"  # it was kept again
 
 
 def test_without_a_cache_folder_kernels_work_with_one_warning(tmp_path):
     (tmp_path / "file").write_text("not a folder")
     result = run(RUN, tmp_path / "file" / "inside")
-    assert result.stdout.split() == ["2", "3", "False", "False", "0"]
+    assert result.stdout.split() == ["2", "3", "2", "False", "False", "2"]
     assert result.stderr.count("Sdf2vecWarning") == 1
     assert "compiled anew in every run" in result.stderr
 
 
 def test_machine_code_that_others_may_have_written_is_compiled_anew(tmp_path):
-    first = run(RUN, tmp_path).stdout
+    run(RUN, tmp_path)
     for path in tmp_path.glob("*.kernel"):
         path.chmod(0o666)
-    assert run(RUN, tmp_path).stdout.split()[-1] == "0"
-    assert run(RUN, tmp_path).stdout.split()[-1] == "1"  # written anew, with other permissions
-    assert first.split()[:2] == ["2", "3"]
+    assert run(RUN, tmp_path).stdout.split()[-1] == "2"
+    assert run(RUN, tmp_path).stdout.split()[-1] == "0"  # written anew, with other permissions
 
 
 def test_the_folder_does_not_grow_without_bound(tmp_path, monkeypatch):
@@ -118,76 +103,22 @@ def test_the_folder_is_the_users_unless_another_is_named(monkeypatch):
 
 # --- fingerprints -------------------------------------------------------------------------------------------
 
-CALLED = """
-import numpy as np
-from sdf2vec.kernel_cache import inlined, kernel
-TABLE, SCALE = np.array([1, 2]), np.float32(3)
-@inlined
-def helper(x):
-    return x * SCALE + TABLE[0]
-@kernel
-def f(x):
-    return helper(x)
-"""
 
-
-ENTRY = """
-from numba import carray, types
-from sdf2vec.kernel_cache import call, entry, kernel
-@entry(types.CPointer(types.float32), types.int64)
-def double(numbers, count):
-    for i in range(count):
-        carray(numbers, count)[i] *= 2
-@kernel
-def run(address, numbers, count):
-    call(address, (numbers, count))
-"""
-
-
-def stem(source):
-    """How the files of f are named, with the module's own name left out."""
-    function = kernel_cache.load(source).f.py_func
-    return kernel_cache._stem(function).removeprefix(function.__module__)
-
-
-def test_equal_code_has_one_fingerprint():
-    assert stem(CALLED) == stem(CALLED + "\n# a remark\n")
-
-
-@pytest.mark.parametrize(
-    ("old", "new"),
-    [
-        ("* SCALE", "- SCALE"),
-        ("float32(3)", "float32(4)"),
-        ("[1, 2]", "[1, 3]"),
-        ("return h", "return 1 + h"),
-    ],
-)
-def test_fingerprints_differ_with_all_that_is_compiled_in(old, new):
-    assert stem(CALLED) != stem(CALLED.replace(old, new))
-
-
-def test_fingerprints_differ_with_what_compiles(monkeypatch):
-    before = stem(CALLED)
-    kernel_cache._stem.cache_clear()
-    monkeypatch.setattr("numba.__version__", "0")
-    assert stem(CALLED) != before
-    kernel_cache._stem.cache_clear()
+def test_machine_code_is_found_by_its_text_and_what_compiles_it(monkeypatch):
+    one, same, other = (Assembly(text) for text in ("a", "a", "b"))
+    assert one.path == same.path != other.path
+    for name, value in (
+        ("llvmlite.__version__", "0"),
+        ("sdf2vec.kernel_cache._processor", lambda: ("z80", "")),
+    ):
+        with monkeypatch.context() as patch:
+            patch.setattr(name, value)
+            assert Assembly("a").path != one.path
 
 
 def test_kernels_of_other_formulas_are_other_kernels():
     one, other = (kernels.drawing((Part("circle"),), mode, 3)[0] for mode in ("over", "additive"))
-    assert isinstance(one.py_func, FunctionType)
-    assert kernel_cache._stem(one.py_func) != kernel_cache._stem(other.py_func)
-
-
-def test_an_entry_is_called_by_its_address():
-    """Arrays are handed over as pointers to their first number; the machine code is kept."""
-    module = kernel_cache.load(ENTRY)
-    numbers = np.arange(4, dtype=np.float32)
-    module.run(module.double.address, numbers[1:], 2)
-    assert list(numbers) == [0, 2, 4, 3]
-    assert kernel_cache.is_compiled(module.double)
+    assert one.assembly.path != other.assembly.path
 
 
 # --- digits -------------------------------------------------------------------------------------------------
@@ -213,8 +144,3 @@ def test_kernels_from_disk_and_fresh_ones_give_the_same_scene(tmp_path):
     found = [run(FIT, tmp_path / folder, "fit").stdout for folder in ("new", "new", "partly")]
     assert found[0]
     assert len(set(found)) == 1
-
-
-def test_a_kernel_returns_what_python_does():
-    function = kernel_cache.load(CALLED).f
-    assert function(np.float32(2)) == 7

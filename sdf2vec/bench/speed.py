@@ -17,7 +17,6 @@ from pathlib import Path
 
 import numpy as np
 import torch
-from numba import njit
 
 from ..blend import OVER
 from ..expr import Expr
@@ -35,6 +34,7 @@ from ..render import fused, kernels, reference
 from ..render.tensors import SceneTensors
 from ..shapes import KINDS
 from ..threads import available_cores, threads_of_its_own
+from .chains import chains
 from .chart import Chart, write
 
 
@@ -151,21 +151,8 @@ def _weight(node: Expr) -> int:
 
 
 def multiply_add_peak() -> float:
-    """Billions of float32 operations per second of one core, in eight chains of multiply-adds that don't wait."""
-
-    @njit(fastmath={"contract"}, error_model="numpy")
-    def chains(x: np.ndarray, rounds: int) -> None:
-        scale, shift = np.float32(0.999), np.float32(0.001)
-        for _ in range(rounds):
-            for i in range(x.size):
-                a, b, c, d = x[i], x[i] + shift, x[i] - shift, x[i] * scale
-                e, f, g, h = a - scale, b - scale, c - scale, d - scale
-                for _ in range(16):
-                    a, b, c, d = a * scale + shift, b * scale + shift, c * scale + shift, d * scale + shift
-                    e, f, g, h = e * scale + shift, f * scale + shift, g * scale + shift, h * scale + shift
-                x[i] = ((a + b) + (c + d)) + ((e + f) + (g + h))
-
-    x, rounds = np.ones(1024, np.float32), 1000
+    """Billions of float32 operations per second of one core."""
+    x, rounds = np.full(1024, 0.25, np.float32), 1000
     return 2 * 8 * 16 * x.size * rounds / seconds(lambda: chains(x, rounds)) / 1e9
 
 

@@ -12,7 +12,7 @@ from .. import flip as paper
 from ..arrays import Float32Array
 from ..threads import in_threads_each
 from .analytic_loss import AnalyticLoss
-from .flip_kernels import carry_back, compare, filter_across
+from .flip_kernels import COMPARE, LINEARISE, carry_back, compare, filter_across
 
 ROWS = 16  # that one thread computes at a time
 
@@ -25,13 +25,15 @@ class Flip(AnalyticLoss):
         seen = paper.appearance(target, paper.SMOOTH)
         self.target: Float32Array = torch.cat([seen.lab, seen.features], dim=1).numpy()  # [B, 5, H, W]
         filters = paper.filters_for(target.dtype, target.device)
-        self.filters = (
-            filters.to_planes.numpy(),
-            filters.across.flatten(1).numpy(),
-            filters.down.flatten(1).numpy(),
-        )
-        planes = np.empty((len(filters.down), *target.shape[1:]), np.float32)
-        self.planes, self.seeds = planes, np.empty_like(planes)  # scratch, kept: fresh memory costs more
+        self.to_planes: Float32Array = filters.to_planes.numpy()
+        self.across: Float32Array = filters.across.flatten(1).numpy()
+        self.down: Float32Array = filters.down.flatten(1).numpy()
+        height, width = target.shape[1:]
+        wider = width + self.across.shape[1] // 2 * 2
+        # Scratch, kept: fresh memory costs more.
+        self.planes = np.empty((len(self.down), height, width), np.float32)
+        self.seeds = np.empty_like(self.planes)
+        self.scratch = np.empty((height, 3, wider), np.float32), np.empty((height, wider), np.float32)
 
     def value_and_gradient(self, render: Float32Array) -> tuple[float, Float32Array]:
         """Mean FLIP over the grounds and pixels, and its derivative by the render."""
@@ -49,10 +51,19 @@ class Flip(AnalyticLoss):
         slopes, grad = np.empty_like(image), np.empty_like(image)
         rows = [(start, min(start + ROWS, height)) for start in range(0, height, ROWS)]
 
-        def each(function: Callable[..., float], *arguments: Any) -> float:
-            return sum(in_threads_each(lambda part: function(*part, *arguments), rows))
+        def each(function: Callable[..., Any], *arguments: Any) -> float:
+            return sum(in_threads_each(lambda part: function(*part, *arguments) or 0.0, rows))
 
-        each(filter_across, image, self.filters, self.planes, slopes)
-        total = each(compare, self.planes, self.filters, target, self.softness, self.seeds)
-        each(carry_back, self.seeds, self.filters, slopes, grad)
+        each(
+            filter_across,
+            LINEARISE.address,
+            image,
+            self.to_planes,
+            self.across,
+            *self.scratch,
+            self.planes,
+            slopes,
+        )
+        total = each(compare, COMPARE.address, self.planes, self.down, target, self.softness, self.seeds)
+        each(carry_back, self.seeds, self.to_planes, self.across, self.down, slopes, *self.scratch, grad)
         return total, grad

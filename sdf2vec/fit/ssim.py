@@ -21,21 +21,28 @@ class Dissimilarity(AnalyticLoss):
         self.across, self.down = (
             gaussian_window(side).numpy().astype(np.float32) for side in (width, height)
         )
-        self.mean = np.stack([local_means(channel, self.across, self.down) for channel in self.target])
-        self.square = np.stack(
-            [local_means(channel * channel, self.across, self.down) for channel in self.target]
-        )
+        self.mean = np.stack([self._means(channel) for channel in self.target])
+        self.square = np.stack([self._means(channel * channel) for channel in self.target])
+
+    def _rows(self, channel: Float32Array) -> Float32Array:
+        """Scratch: a channel filtered across."""
+        return np.empty((channel.shape[0], channel.shape[1] - len(self.across) + 1), np.float32)
+
+    def _means(self, channel: Float32Array) -> Float32Array:
+        rows = self._rows(channel)
+        out = np.empty((len(rows) - len(self.down) + 1, rows.shape[1]), np.float32)
+        local_means(channel, self.across, self.down, rows, out)
+        return out
 
     def value_and_gradient(self, render: Float32Array) -> tuple[float, Float32Array]:
         """1 − SSIM and its derivative by the render."""
         grad = np.empty_like(render)
 
         def channel(c: int) -> float:
-            return float(
-                similarity(
-                    render[c], self.target[c], self.mean[c], self.square[c], self.across, self.down, grad[c]
-                )
-            )
+            image, mean = render[c], self.mean[c]
+            scratch = np.empty_like(image), self._rows(image), np.empty((3, *mean.shape), np.float32)
+            window = self.across, self.down
+            return float(similarity(image, self.target[c], mean, self.square[c], *window, *scratch, grad[c]))
 
         total = sum(in_threads_each(channel, range(len(render))))
         grad *= np.float32(-1.0 / self.mean.size)

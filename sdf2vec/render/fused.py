@@ -19,11 +19,11 @@ from ..arrays import Float32Array, Int32Array, IntArray
 from ..blend import COMPOSITING
 from ..kernel_cache import Entry
 from ..layer import Structure
-from ..threads import in_threads
+from ..threads import in_threads, threads
 from . import kernels, tiling
 from .reference import canvas_axes
 from .tensors import Group, SceneTensors
-from .tiling import TILE
+from .tiling import PIXELS, TILE
 
 
 def composite(tensors: SceneTensors, width: int, height: int, channels: int = 4) -> torch.Tensor:
@@ -136,7 +136,7 @@ def _bin(canvas: _Canvas, rows: Float32Array) -> Bins:
     pairs = tiling.keep_touching(pairs, distances, bounds, tiles, layers, spans)
     starts = np.zeros(canvas.columns * canvas.rows + 1, np.int64)
     sorted_layers, sorted_spans = np.empty(pairs, np.int32), np.empty((pairs, 2), np.int32)
-    tiling.sort_pairs(pairs, tiles, layers, spans, starts, sorted_layers, sorted_spans)
+    tiling.sort_pairs(pairs, tiles, layers, spans, starts, np.empty_like(starts), sorted_layers, sorted_spans)
     return Bins(starts, sorted_layers, sorted_spans)
 
 
@@ -169,7 +169,8 @@ class _Composite(torch.autograd.Function):
         width, longest = ctx.shared[5].shape[1], int(np.diff(bins.starts).max(initial=0))
         grads = np.zeros((len(bins.layers), width), np.float32)
         ground = np.zeros((len(bins.starts) - 1, 4), np.float32)
-        in_threads(tiling.draw_tiles_backward, *ctx.shared, _array(cotangent), longest, grads, ground)
+        kept = np.empty((threads(), longest, canvas.channels, PIXELS), np.float32)
+        in_threads(tiling.draw_tiles_backward, kept, *ctx.shared, _array(cotangent), grads, ground)
         totals = np.zeros((len(canvas.kinds), width), np.float64)
         tiling.reduce_pairs(bins.layers, grads, totals)
         background = ground.sum(axis=0, dtype=np.float64)

@@ -1,4 +1,4 @@
-"""The fused renderer's kernels: text generated from the same expressions as everything else.
+"""The fused renderer's kernels: assembly generated from the same expressions as everything else.
 
 Every structure of layers is compiled by itself, whatever else a scene has; `tiling` calls it by its address.
 """
@@ -11,16 +11,15 @@ from functools import cache
 
 import numpy as np
 
-from .. import kernel_cache
 from ..arrays import IntArray
 from ..expr import Expr, const, var
 from ..graph import components_of, scalarize, walk
-from ..kernel_cache import Entry
+from ..kernel_cache import Assembly, Entry
 from ..layer import NEVER, PIXEL, Formula, P, Structure
-from ..lower.numba import PREAMBLE, Block, backward, forward, scalar
+from ..lower.block import Block
+from ..lower.llvm import assembled, backward, forward, scalar
 from ..operation import VEC4
-from ..templating import template
-from .tiling import TILE
+from .tiling import PIXELS, TILE
 
 FARTHEST = (
     1.001 * (TILE - 1) / 2 * 2**0.5
@@ -72,35 +71,30 @@ def drawing(structure: Structure, compositing: str, channels: int) -> tuple[Entr
     blocks = [drawn(formula, "layer", compositing, channels)]
     if formula.is_solid:
         blocks.append(filled(formula, "layer", compositing, channels))
-    modules = [kernel_cache.load(drawing_text(block, channels)) for block in blocks]
-    return tuple(entry for module in modules for entry in (module.draw, module.draw_backward))
+    assemblies = [Assembly(assembled(drawing_texts(block, channels))) for block in blocks]
+    return tuple(assembly[name] for assembly in assemblies for name in ("layer", "layer_backward"))
 
 
 @cache
 def measuring(structure: Structure) -> tuple[Entry, Entry]:
     """`BOUNDS` and `DISTANCE` of layers of a structure, whatever they are drawn in."""
-    module = kernel_cache.load(measuring_text(Formula.of(structure)))
-    return module.bounds, module.distance
+    formula = Formula.of(structure)
+    bounds = scalar("bounds", culling(formula), (), formula.uniforms)
+    distance = scalar("distance", scalarize(formula.distance), components_of(P), formula.uniforms)
+    assembly = Assembly(assembled([bounds, distance]))
+    return assembly["bounds"], assembly["distance"]
 
 
-def drawing_text(block: Block, channels: int) -> str:
-    """The module that draws what a block says on tiles."""
-    driver = template("draw.py.jinja").render(name=block.name, channels=channels, numbers=len(block.uniforms))
-    return "\n\n".join(
-        [PREAMBLE, forward(block, carried(channels)), backward(block, carried(channels)), driver]
-    )
+def drawing_texts(block: Block, channels: int) -> tuple[str, str]:
+    """`NAME(u, first, last, x, y, below, kept)` lays a layer on pixels; `kept` takes what was there before.
 
-
-def measuring_text(formula: Formula) -> str:
-    """The module that says where a layer is."""
-    numbers = formula.uniforms
-    return "\n\n".join(
-        [
-            PREAMBLE,
-            scalar("bounds_of", culling(formula), (), numbers),
-            scalar("distance_at", scalarize(formula.distance), components_of(P), numbers),
-            template("measure.py.jinja").render(numbers=len(numbers)),
-        ]
+    `NAME_backward(u, first, last, x, y, below, cotangent, grad)`: its derivatives, by the row of numbers added to
+    `grad`, by what was below in place of `cotangent`.
+    """
+    point = {"x": 1, "y": 1, "below": channels}
+    return (
+        forward(block, point | {"kept": channels}, PIXELS, carried(channels)),
+        backward(block, point | {"cotangent": channels}, PIXELS, carried(channels)),
     )
 
 
@@ -115,4 +109,4 @@ def addresses(entries: Sequence[tuple[Entry, ...]]) -> IntArray:
 def is_compiled(structures: Sequence[Structure], compositing: str, channels: int) -> bool:
     """Whether all kernels for layers of these structures have been compiled before on this machine."""
     entries = [entry for s in structures for entry in (*drawing(s, compositing, channels), *measuring(s))]
-    return all(map(kernel_cache.is_compiled, entries))
+    return all(entry.assembly.is_kept for entry in entries)

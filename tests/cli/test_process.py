@@ -28,7 +28,7 @@ for arguments in (["--help"], ["check", "--help"], ["render", "--help"], ["expor
     try:
         main(arguments)
     except SystemExit as end:
-        print(end.code, *{"torch", "numba", "numpy"} & set(sys.modules), file=sys.stderr)
+        print(end.code, *{"torch", "llvmlite", "numpy"} & set(sys.modules), file=sys.stderr)
 """
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     lines = [line for line in done.stderr.splitlines() if not line.startswith("sdf2vec: ")]

@@ -6,9 +6,13 @@ import re
 import sys
 from importlib import import_module
 
-from sdf2vec import Scene, warming, workers
+from sdf2vec import Scene
 from sdf2vec.fit.loop import Progress
+from sdf2vec.kernel_cache import Assembly
+from sdf2vec.layer import Part
+from sdf2vec.paints import PAINTS
 from sdf2vec.progress import telling
+from sdf2vec.render import kernels, tiling
 from sdf2vec.running import Running
 from sdf2vec.shapes import KINDS
 from tests.cli.command import SHORT
@@ -64,32 +68,14 @@ def test_without_a_terminal_a_line_says_that_kernels_are_compiled(folder, run, m
     assert said not in run("photo.jpg", *SHORT, "-o", "a.json", "-q").out
 
 
-def test_warming_up_fits_every_kind(folder, run, monkeypatch):
-    """In processes, which are none here."""
-    seen: list[tuple[str, str]] = []
-
-    class Here:
-        capacity = 2
-
-        def __init__(self):
-            self.under_way = []
-
-        def start(self, task, *arguments):
-            assert task is warming.warm
-            seen.append(arguments)
-            self.under_way.append((arguments, 1.5))
-            return arguments
-
-        def ended(self, seconds):
-            ended, self.under_way = self.under_way, []
-            return ended
-
-        def close(self):
-            pass
-
-    monkeypatch.setitem(workers._WORKERS, "processes", lambda *_: Here())
+def test_warming_up_compiles_what_fits_of_every_kind_need(folder, run, monkeypatch):
+    compiled: list[str] = []
+    monkeypatch.setattr(Assembly, "code", lambda assembly: compiled.append(assembly.stem))
     lines = run("--warm-up").out.decode().splitlines()
-    assert {("circle", "over"), ("gabor", "additive"), ("mixed", "over")} <= set(seen)
-    assert len(lines) == len(seen) == 2 * (len(KINDS) + 1)
-    assert "circle, over: 1.5 s" in lines[0]
-    assert warming.warm("circle", "over") > 0
+    assert len(lines) == 1 + len(KINDS) * len(PAINTS)
+    assert "circle, flat: 0.0 s" in lines[1]
+    for kind in KINDS:
+        entries = [*kernels.drawing((Part(kind),), "additive", 4), *kernels.measuring((Part(kind),))]
+        assert {entry.assembly.stem for entry in entries} <= set(compiled)
+    assert tiling.draw_tiles.assembly.stem in compiled
+    assert len(set(compiled)) > 100

@@ -391,6 +391,7 @@ def test_all_layers_are_there_before_a_phase_ends(steps, full):
     assert counts[0] == (full if steps == 1 or (full > 8 and steps == 3) else 4)
 
 
+@pytest.mark.usefixtures("kernels_there")
 @pytest.mark.parametrize(("shapes", "union"), [(1, 1), (9, 1), (30, 1), (60, 2)])
 def test_a_fit_that_grows_ends_with_all_shapes(monkeypatch, shapes, union):
     growing = Phase("all", 40, 24, growth=Growth(4, 5), relocation=Relocation(6, 0.2, until=0.5))

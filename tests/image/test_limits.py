@@ -173,13 +173,13 @@ def test_streams_that_do_not_end(tmp_path, monkeypatch):
 
 
 def test_limits_can_be_raised_and_lowered(monkeypatch):
-    data = png(2000, 1000, 1, 0, b"")
+    data = png(3000, 1000, 1, 0, b"")
     monkeypatch.setenv("SDF2VEC_MAX_MEGAPIXELS", "1")
     refused = refusal(data)
     assert refused.endswith(
-        "more than 1 megapixels; shrink it first, or raise the limit: SDF2VEC_MAX_MEGAPIXELS=2"
+        "more than 1 megapixels; shrink it first, or raise the limit: SDF2VEC_MAX_MEGAPIXELS=3"
     )
-    monkeypatch.setenv("SDF2VEC_MAX_MEGAPIXELS", "2")
+    monkeypatch.setenv("SDF2VEC_MAX_MEGAPIXELS", "3")
     assert "truncated" in refusal(data)
 
 
