@@ -60,6 +60,7 @@ class ExportKeywords(TypedDict, total=False):
     framing: Literal["fit", "cover", "crop"] | None
     animate: bool
     svg_profile: Literal["filters", "portable", "inkscape"]
+    svg_size: Literal["responsive", "fixed"]
     max_bytes: str | int | None
     title: str
     alt: str

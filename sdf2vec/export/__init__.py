@@ -80,7 +80,7 @@ def _shader(
 
 
 def _svg(name: str, suffix: str, about: str, endings: tuple[str, ...] = ()) -> Exporter:
-    module, heeds = "sdf2vec.export.svg", ("svg_profile", "max_bytes", "title", "alt")
+    module, heeds = "sdf2vec.export.svg", ("svg_profile", "svg_size", "max_bytes", "title", "alt")
     accepts, forms = deferred(module, "accepts"), deferred(module, f"{name}_forms")
     return Exporter(suffix, deferred(module, name), about, accepts, heeds, endings, forms=forms)
 

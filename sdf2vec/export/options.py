@@ -14,6 +14,8 @@ from ..scene import Scene
 GLSL_VERSIONS = {"es300": "300 es", "330": "330", "es100": "100"}
 LAYOUTS = ("auto", "readable", "table", "tiled", "packed", "data")
 SVG_PROFILES = ("filters", "portable", "inkscape")
+FIXED = "fixed"
+SVG_SIZES = ("responsive", FIXED)
 
 
 Size = Annotated[int, number("size in pixels", "PIXELS", 1, 16384, "shortest side of a PNG, JPEG or WebP")]
@@ -45,6 +47,10 @@ class Options(Struct, frozen=True, kw_only=True):
             SVG_PROFILES,
         ),
     ] = SVG_PROFILES[0]
+    svg_size: Annotated[
+        str,
+        choice("SVG size", "an SVG as large as where it is put, or as the picture, in pixels", SVG_SIZES),
+    ] = SVG_SIZES[0]
     max_bytes: (
         Annotated[
             str | int,

@@ -9,12 +9,14 @@ from dataclasses import replace
 from functools import partial
 from urllib.parse import quote
 
+from msgspec import structs
+
 from ...deferred import deferred
 from ...errors import Sdf2vecError
 from ...files import one_line
 from ...scene import Scene
 from ..exported import MARK, Exported
-from ..options import Accepts, Options
+from ..options import FIXED, Accepts, Options
 from .layers import drawing
 from .plan import DETAILS, Detail, Planner
 from .writer import MARGINS, Style, written
@@ -83,7 +85,8 @@ def pdf(scene: Scene, options: Options) -> Exported:
 
 def pdf_forms(scene: Scene, options: Options) -> list[Callable[[], Exported]]:
     """The same, and ever coarser drawings."""
-    return [partial(_as_pdf, make) for make in _forms(scene, options, PORTABLE)]
+    sized = structs.replace(options, svg_size=FIXED)  # a page has a size
+    return [partial(_as_pdf, make) for make in _forms(scene, sized, PORTABLE)]
 
 
 def _as_pdf(make: Callable[[], Exported]) -> Exported:
@@ -106,7 +109,8 @@ def _planner(scene: Scene, profile: str) -> Planner:
 
 def _text(planner: Planner, detail: Detail, options: Options) -> str:
     grain = detail.grain
-    style = Style(detail.named, grain is not None, grain.margins if grain else MARGINS)
+    sized = options.svg_size == FIXED
+    style = Style(detail.named, grain is not None, grain.margins if grain else MARGINS, sized)
     drawn = drawing(planner.scene, planner.plan(detail), detail)
     return written(drawn, one_line(options.title), style, one_line(options.alt) if options.alt else "")
 

@@ -47,7 +47,7 @@ STROKES = {"fill": "currentColor", "stroke": "currentColor", "stroke-width": "0"
 
 @dataclass(frozen=True)
 class Style:
-    """How a drawing is written. `named`: with the figures' names as ids.
+    """How a drawing is written. `named`: with the figures' names as ids; `sized`: with a width and a height.
 
     `compact`: each figure with as few words as there are. Colour is `currentColor`, said once, the softness a class,
     a polygon's rounding a stroke. `margins`: of filters, in shares of the element's box.
@@ -56,6 +56,7 @@ class Style:
     named: bool = True
     compact: bool = False
     margins: Sequence[float] = MARGINS
+    sized: bool = False
 
 
 def written(drawing: Drawing, title: str, style: Style, alt: str = "") -> str:
@@ -75,8 +76,9 @@ class _Writer:
         self.drawing = drawing
         self.style = style
         width, height = drawing.width, drawing.height
+        size = (number(width * drawing.scale, 4), number(height * drawing.scale, 4))
         self.svg = svgwrite.Drawing(
-            size=(number(width * drawing.scale, 4), number(height * drawing.scale, 4)),
+            size=size if style.sized else None,
             viewBox=f"0 0 {number(width, 4)} {number(height, 4)}",
             role="img",
             debug=False,
