@@ -10,7 +10,7 @@ from .declared import checked, documented
 from .deferred import deferred
 from .errors import Sdf2vecError
 from .export.exported import Exported
-from .export.options import FIXED, Options
+from .export.options import Options
 from .exports import Exports, share_of_limit
 from .fit.settings import Settings, settings_of
 from .keywords import ExportKeywords, FitKeywords
@@ -107,7 +107,7 @@ def _png(scene: Scene) -> str:
     return b64encode(exported(scene, "png", size=min(NOTEBOOK, scene.width, scene.height)).raw).decode()
 
 
-SHOWN |= {"image/png": _png, "image/svg+xml": lambda scene: str(export(scene, "svg", svg_size=FIXED))}
+SHOWN |= {"image/png": _png, "image/svg+xml": lambda scene: str(export(scene, "svg", svg_size="fixed"))}
 
 
 def check(

@@ -352,7 +352,7 @@ def test_a_notebook_shows_a_scene():
     with Image.open(io.BytesIO(base64.b64decode(bundle["image/png"]))) as image:
         assert image.size == (24, 16)
     drawing = scene._repr_mimebundle_(include={"image/svg+xml"})
-    assert drawing == {"image/svg+xml": sdf2vec.export(scene, "svg")}
+    assert drawing == {"image/svg+xml": sdf2vec.export(scene, "svg", svg_size="fixed")}
     assert scene._repr_mimebundle_(exclude={"image/png"}) == {}
     wide = Scene(4000, 2000, scene.layers)
     with Image.open(io.BytesIO(base64.b64decode(wide._repr_mimebundle_()["image/png"]))) as image:
