@@ -65,4 +65,5 @@ class ExportKeywords(TypedDict, total=False):
     title: str
     alt: str
     alone: bool
+    near: float | None
     original: bytes | None

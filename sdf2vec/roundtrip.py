@@ -258,6 +258,13 @@ def _element(trip: RoundTrip, made: Exported, scene: Scene, width: int, height: 
     return premultiply(trip.drawn(made.data, width, height, scene=dumps(scene)))
 
 
+def _in_element(trip: RoundTrip, made: Exported, scene: Scene, width: int, height: int) -> Pixels:
+    """A compact scene, or its address, in the element that shows such."""
+    data = base64.b64decode(made.data.partition(",")[2]) if isinstance(made.data, str) else made.data
+    element = Exports(scene).export("component").data
+    return premultiply(trip.drawn(element, width, height, scene=data))
+
+
 def _decoded(trip: RoundTrip, made: Exported, scene: Scene, width: int, height: int) -> Pixels:
     """The drawing that an address holds."""
     head, _, rest = str(made.data).partition(",")
@@ -314,4 +321,6 @@ ROUND_TRIPS: dict[str, tuple[RoundTrip, ...]] = {
     "pdf": (RoundTrip("pdf", "pdfium", _whole, False),),
     "html": (RoundTrip("html", "page", _whole, False),),
     "component": (RoundTrip("component", "element", _element, False),),
+    "sdf": (RoundTrip("sdf", "element", _in_element, False),),
+    "sdf-uri": (RoundTrip("sdf-uri", "element", _in_element, False),),
 }

@@ -6,6 +6,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import partial
 
+from ..compact_file import MAGIC
 from ..deferred import deferred
 from ..errors import Sdf2vecError
 from ..scene import MAX_SHAPES, Scene
@@ -85,6 +86,22 @@ def _svg(name: str, suffix: str, about: str, endings: tuple[str, ...] = ()) -> E
     return Exporter(suffix, deferred(module, name), about, accepts, heeds, endings, forms=forms)
 
 
+def _compact(
+    name: str, suffix: str, about: str, endings: tuple[str, ...] = (), is_text: bool = False
+) -> Exporter:
+    module = "sdf2vec.export.compact_scene"
+    return Exporter(
+        suffix,
+        deferred(module, name),
+        about,
+        heeds=("max_bytes",),
+        other_endings=endings,
+        mark=MAGIC,
+        forms=deferred(module, f"{name}_forms"),
+        is_text=is_text,
+    )
+
+
 def _raster(name: str, about: str, *endings: str) -> Exporter:
     suffix = f".render.{name}"
     write = deferred("sdf2vec.export.raster", name)
@@ -153,6 +170,8 @@ EXPORTERS: dict[str, Exporter] = {
         other_endings=(".json",),
         mark=f'"format": "{FORMAT}"'.encode(),
     ),
+    "sdf": _compact("sdf", ".sdf", "the scene in few bytes, for <sdf-image>"),
+    "sdf-uri": _compact("sdf_uri", ".sdf.txt", "the same as a data URI", is_text=True),
     "png": _raster("png", "the render, at any --size"),
     "jpg": _raster("jpg", "the same as JPEG", ".jpeg"),
     "webp": _raster("webp", "the same as WebP"),
