@@ -56,7 +56,7 @@ class ExportKeywords(TypedDict, total=False):
 
     size: int | None
     glsl: Literal["es300", "330", "es100"]
-    layout: Literal["auto", "readable", "table", "tiled", "packed", "data"]
+    layout: Literal["auto", "readable", "table", "tiled", "packed", "data", "buffer"]
     framing: Literal["fit", "cover", "crop"] | None
     animate: bool
     svg_profile: Literal["filters", "portable", "inkscape"]

@@ -36,8 +36,9 @@ STEP = 1.5  # dB between two forms
 GAINED = 2.0  # dB, about, that fitting again brings
 TRIES = 2
 LOOKED_AT = dict(zip(PRECISIONS, (9, 6, 6, 6), strict=True))  # bits at which errors are looked at
-FREE = dict.fromkeys(PRECISIONS, 20)
+FREE = dict.fromkeys(PRECISIONS, 16)
 LEAST_BITS = 2
+MANY = 4096  # layers: what more want is not looked for
 
 
 def sdf(scene: Scene, options: Options) -> Exported:
@@ -80,7 +81,8 @@ def _as_uri(make: Callable[[], Exported]) -> Exported:
 
 def fine(scene: Scene, aim: float) -> bytes:
     """A compact file that is so many dB from the scene's render, and not fitted again."""
-    return written(scene, _Sizer(scene).bits(aim))
+    many = len(scene.layers) > MANY
+    return written(scene, FREE if many else _Sizer(scene).bits(aim))
 
 
 def _smallest(sizer: _Sizer) -> Exported:

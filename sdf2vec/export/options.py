@@ -12,7 +12,8 @@ from ..declared import choice, number, plain
 from ..scene import Scene
 
 GLSL_VERSIONS = {"es300": "300 es", "330": "330", "es100": "100"}
-LAYOUTS = ("auto", "readable", "table", "tiled", "packed", "data")
+BUFFER = "buffer"  # a Shadertoy of two tabs
+LAYOUTS = ("auto", "readable", "table", "tiled", "packed", "data", BUFFER)
 SVG_PROFILES = ("filters", "portable", "inkscape")
 FIXED = "fixed"
 SVG_SIZES = ("responsive", FIXED)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 
 from .. import compact_file, entropy
 from ..blend import FRAMINGS, JOINS, OVER, display, grid_point, union_reach
@@ -25,31 +25,37 @@ from .tiles import COARSEST
 SLACK = var("slack")
 
 
-def script_parts(forms: Sequence[Form]) -> dict[str, object]:
+# What a page bears of files from anywhere: bytes, layers, entries of its lists in all and in a cell, cells.
+BEARS = {"bytes": 1 << 26, "layers": 1 << 14, "listed": 1 << 21, "deep": 1 << 12, "cells": 1 << 16}
+BEARS_ITS_OWN = BEARS | {"layers": MAX_SHAPES, "listed": 1 << 26, "deep": MAX_SHAPES}
+
+
+def script_parts(forms: Sequence[Form], bears: Mapping[str, int] = BEARS) -> dict[str, object]:
     """What `scene.js.jinja` takes for scenes of these forms, which differ in nothing but the compositing."""
     form = forms[0]
     kinds = {variant.kind: KINDS[variant.kind] for variant in form.variants}
     paints = {variant.paint: PAINTS[variant.paint] for variant in (*form.variants, Variant("", FLAT))}
     joins = form.joins or tuple(JOINS)[:1]
     return {
-        "kinds": json.dumps({name: list(map(_told, kind.parameters)) for name, kind in kinds.items()}),
-        "paints": json.dumps({name: list(map(_told, paint.parameters)) for name, paint in paints.items()}),
-        "look": json.dumps(list(map(_told, LOOK))),
-        "join": json.dumps(_told(JOIN)),
-        "ground": json.dumps(_told(GROUND)),
-        "sheer": json.dumps(_told(SHEER)),
-        "patches": json.dumps([name for name, kind in kinds.items() if kind.patch is not None]),
+        "kinds": _json({name: list(map(_told, kind.parameters)) for name, kind in kinds.items()}),
+        "paints": _json({name: list(map(_told, paint.parameters)) for name, paint in paints.items()}),
+        "look": _json(list(map(_told, LOOK))),
+        "join": _json(_told(JOIN)),
+        "ground": _json(_told(GROUND)),
+        "sheer": _json(_told(SHEER)),
+        "patches": _json([name for name, kind in kinds.items() if kind.patch is not None]),
+        "bears": _json(bears),
         "most_pixels": CANVAS_SIDE,
         "most_shapes": MAX_SHAPES,
         "most_joined": MAX_JOINED,
-        "joins": json.dumps(joins),
-        "adds": json.dumps([JOINS[name].adds for name in joins]),
-        "variants": json.dumps([" ".join(variant) for variant in form.variants]),
+        "joins": _json(joins),
+        "adds": _json([JOINS[name].adds for name in joins]),
+        "variants": _json([" ".join(variant) for variant in form.variants]),
         "flat": FLAT,
         "over": OVER,
         "coarsest": COARSEST,
         "formulas": "\n\n".join(_formulas(form.variants)),
-        "drawn": json.dumps({form.compositing: expression(form.drawn(), GLSL) for form in forms}),
+        "drawn": _json({form.compositing: expression(form.drawn(), GLSL) for form in forms}),
         "stride": form.stride,
         "width": DATA_WIDTH,
         **_compact_parts(form.variants),
@@ -64,8 +70,8 @@ def _told(parameter: Parameter) -> dict[str, object]:
         "name": parameter.name,
         "unit": unit.name,
         "width": parameter.width,
-        "low": unit.low,
-        "high": unit.high,
+        "low": int(unit.low),
+        "high": int(unit.high),
     }
     usual = {"usual": parameter.values_from(parameter.start)} if parameter in OPTIONAL else {}
     positive = {"positive": True} if parameter.positive else {}
@@ -82,7 +88,7 @@ def _compact_parts(variants: Iterable[Variant]) -> dict[str, object]:
         for unit in units
     }
     return {
-        "units": json.dumps(codecs),
+        "units": _json(codecs),
         "values": "\n".join(
             function_text(f"VALUES.{name}", scalarize(formula), [root]).removeprefix("const ")
             for name, formula in formulas.items()
@@ -90,7 +96,7 @@ def _compact_parts(variants: Iterable[Variant]) -> dict[str, object]:
         ),
         "magic": list(compact_file.MAGIC),
         "compact_version": compact_file.VERSION,
-        "precisions": json.dumps(compact_file.PRECISIONS),
+        "precisions": _json(compact_file.PRECISIONS),
         "bits_of_bits": compact_file.BITS_OF_BITS,
         "most_bits": compact_file.MOST_BITS,
         "most_parts": compact_file.MOST_PARTS,
@@ -152,3 +158,7 @@ def _shader_parts(forms: Sequence[Form]) -> dict[str, object]:
         },
         "table": table_part(forms[0], GLSL) | {"count": "count", "drawn": "${drawn}"},
     }
+
+
+def _json(value: object) -> str:
+    return json.dumps(value, separators=(",", ":"))

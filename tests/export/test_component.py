@@ -3,6 +3,7 @@
 import base64
 import json
 import random
+from contextlib import contextmanager
 from dataclasses import replace
 
 import numpy as np
@@ -29,6 +30,21 @@ def opened(require_engine):
     def show(scene, width, height, page=ELEMENT):
         files = {"index.html": page, "sdf-image.js": module(), "picture.scene.json": scene}
         return chromium.opened(files, width, height)
+
+    return show
+
+
+@pytest.fixture
+def reading(require_engine):
+    """A page whose function `read` reads scenes as the element does."""
+    require_engine("chromium")
+
+    @contextmanager
+    def show():
+        files = {"index.html": MODULE, "sdf-image.js": f"{module()}\nwindow.read = sceneOf;"}
+        with chromium.opened(files, 50, 50) as page:
+            chromium.wait_until(page, "Boolean(window.read)", seconds=10)
+            yield page
 
     return show
 
@@ -64,15 +80,14 @@ def test_it_shows_a_scene_file_and_follows_its_size(compositing, opened):
 
 
 @pytest.mark.parametrize("compositing", ["over", "additive"])
-def test_compact_scenes_are_read_as_python_reads_them(compositing, opened):
+def test_compact_scenes_are_read_as_python_reads_them(compositing, reading):
     """To the last digit, whatever kinds, paints, joins and ground there are."""
     scenes = [
         random_scene(compositing=compositing, layers=14, seed=seed, transparent=bool(seed))
         for seed in range(2)
     ]
     files = [written(scene, dict.fromkeys(PRECISIONS, bits)) for scene in scenes for bits in (5, 13)]
-    with opened("{}", 10, 10, f'<script type="module">{module()} window.read = sceneOf</script>') as page:
-        chromium.wait_until(page, "window.read")
+    with reading() as page:
         for file in files:
             compact, plain = base64.b64encode(file).decode(), json.loads(dumps(sdf2vec.loads(file)))
             found = page.evaluate(
@@ -88,7 +103,8 @@ def test_compact_scenes_from_a_file_an_attribute_and_an_address(require_engine):
     file = written(scene, dict.fromkeys(PRECISIONS, 12))
     address = sdf2vec.export(scene, "sdf-uri")
     assert isinstance(address, str)
-    policy = "<meta http-equiv=Content-Security-Policy content=\"default-src 'none'; script-src 'self'; connect-src 'self'; style-src 'unsafe-inline'\">"
+    allowed = "default-src 'none'; script-src 'self'; connect-src 'self'; style-src 'unsafe-inline'"
+    policy = f'<meta http-equiv="Content-Security-Policy" content="{allowed}">'
     elements = [
         '<sdf-image src="a.sdf"></sdf-image>',
         f'<sdf-image data="{base64.b64encode(file).decode()}"></sdf-image>',
@@ -287,7 +303,7 @@ def test_what_scene_files_may_not_say_is_refused(opened):
         assert_shows(page, sdf2vec.loads(json.dumps(GOOD)), 100, 100)
 
 
-def test_what_compact_files_may_not_say_is_refused(opened):
+def test_what_compact_files_may_not_say_is_refused(reading):
     """As `loads` refuses it; and of random ones nothing is worse than refused."""
     scene = random_scene(("circle",), layers=2, seed=3, width=50, height=50)
     good, r = written(scene, dict.fromkeys(PRECISIONS, 9)), random.Random(5)
@@ -300,9 +316,7 @@ def test_what_compact_files_may_not_say_is_refused(opened):
       return files.map((data) => { try { window.read(Uint8Array.from(atob(data), (c) => c.charCodeAt(0))); return '' }
         catch (error) { return error.constructor.name + error.message } });
     }"""
-    page_text = f'<sdf-image></sdf-image><script type="module">{module()} window.read = sceneOf</script>'
-    with opened("{}", 100, 100, page_text) as page:
-        chromium.wait_until(page, "window.read")
+    with reading() as page:
         found = page.evaluate(collect, [base64.b64encode(file).decode() for file in files])
     for file, said in zip(files, found, strict=True):
         assert bool(said) == _is_refused(file), (file, said)
