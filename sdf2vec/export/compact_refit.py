@@ -26,7 +26,7 @@ RATE, LAST_RATE = 0.1, 0.02  # steps of a number in one of Adam's
 BETAS = (0.9, 0.95)
 KERNELS = 1 << 20  # layers × pixels from which kernels pay
 SORTS = 6  # of layers: kernels for more take too long to compile
-LARGEST = 2048  # layers: more would take too long
+FEW, LARGEST = 16, 2048  # layers: fewer take few bytes, more would take too long
 
 Shares = Mapping[str, float]  # by precision: of its numbers, those that are on steps
 PLACED = {"place": 1.0, "falloff": 1.0, "opacity": 1.0}
@@ -58,7 +58,7 @@ def refitted(scene: Scene, scales: Scales) -> Scene:
     tensors = from_scene(scene)
     size = _size(scene)
     compose = _composite(tensors, size)
-    if compose is None or len(scene.layers) > LARGEST:
+    if compose is None or not FEW <= len(scene.layers) <= LARGEST:
         return scene
     with threads_of_its_own():
         wanted = compose(tensors, *size).detach()

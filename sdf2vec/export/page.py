@@ -25,7 +25,7 @@ from .exported import Exported
 from .options import Options
 from .page_texts import PageTexts
 from .raster import png
-from .records import form_of
+from .records import Form, Variant, form_of
 from .script import BEARS_ITS_OWN, script_parts
 from .shader import most_shapes
 from .svg import svg
@@ -62,7 +62,7 @@ def html(scene: Scene, options: Options) -> Exported:
         file=base64.b64encode(file).decode(),
         places="\n".join(texts.functions),
         policy=POLICY,
-        **script_parts([form_of(held)], BEARS_ITS_OWN),
+        **script_parts([_form(held)], BEARS_ITS_OWN),
     )
     text = SCRIPT.sub(lambda match: f'<script type="module">{_lean(match[1])}</script>', text)
     return Exported(text.replace(POLICY, policy_of(text), 1))
@@ -71,6 +71,11 @@ def html(scene: Scene, options: Options) -> Exported:
 def _aim(shapes: int) -> float:
     """How near the page's scene is to be: half as many shapes can have numbers that are twice as fine."""
     return min(NEAR + 20.0 * math.log10(max(1.0, MANY / max(shapes, 1))), NEAREST)
+
+
+def _form(scene: Scene) -> Form:
+    """The form of the scene's records; of one without any that of some."""
+    return form_of(scene) if scene.layers else Form((Variant("circle"),), (), scene.compositing)
 
 
 def _lean(script: str) -> str:

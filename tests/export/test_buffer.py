@@ -24,7 +24,7 @@ def tabs_of(scene, **options):
 def drawn(tab, before, frame, size=SIZE):
     """One frame of a tab, [H, W, 4] from below, as its successor reads it."""
     uniforms = {"iResolution": (*map(float, size), 1.0), "iFrame": frame}
-    pixels = opengl.render(SHADERTOY_HEAD + tab + SHADERTOY_TAIL, *size, uniforms, texture=before)
+    pixels = opengl.render(SHADERTOY_HEAD + tab + SHADERTOY_TAIL, size[0], size[1], uniforms, before)
     return pixels[::-1]
 
 
