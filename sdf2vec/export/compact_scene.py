@@ -57,10 +57,10 @@ def sdf_forms(scene: Scene, options: Options) -> list[Callable[[], Exported]]:
     aims = [first - STEP * i for i in range(1 + math.floor((first - COARSEST) / STEP))]
     if options.max_bytes is not None:
         limit = ByteLimit.of(options.max_bytes)
-        much = [
-            i for i, aim in enumerate(aims) if limit.share(written(scene, sizer.bits(aim - GAINED))) > 1.0
-        ]
-        aims = aims[min(len(much), len(aims) - 1) :]
+        fitting = (
+            i for i, a in enumerate(aims) if limit.share(written(scene, sizer.bits(a - GAINED))) <= 1.0
+        )
+        aims = aims[next(fitting, len(aims) - 1) :]
     return [*(partial(_made, sizer, aim) for aim in aims), partial(_smallest, sizer)]
 
 

@@ -71,12 +71,11 @@ class Sort:
             if node.args and all(arg in known or arg.op == "const" for arg in node.args):
                 known.add(node)
             if node in known and node.type is FLOAT:
-                texts.setdefault(literal(self.value(node, self.numbers)), node)
+                texts.setdefault(literal(constant(substitute(node, self._known(self.numbers)))), node)
         return texts
 
-    def value(self, node: Expr, numbers: Iterable[float]) -> float:
-        """What an expression is for a row."""
-        return constant(substitute(node, dict(zip(self.inputs, map(const, numbers), strict=True))))
+    def _known(self, numbers: Iterable[float]) -> dict[Expr, Expr]:
+        return dict(zip(self.inputs, map(const, numbers), strict=True))
 
     def placed(self, text: str) -> str:
         """The text of a layer of `numbers` with places for what stands there."""
@@ -95,7 +94,8 @@ class Sort:
 
     def values(self, layer: Layer) -> list[str]:
         """What stands at the places for a layer."""
-        return [literal(self.value(node, layer.numbers)) for node in self.used]
+        known = self._known(layer.numbers)
+        return [literal(constant(substitute(node, known))) for node in self.used]
 
     @property
     def function(self) -> str:

@@ -141,12 +141,12 @@ def test_a_page_holds_the_scene_once_and_hardly_less():
 
 
 @pytest.mark.parametrize("compositing", ["over", "additive"])
-def test_texts_are_those_of_the_exporter_whatever_is_in_them(compositing, opened):
+def test_texts_are_those_of_the_exporter_whatever_is_in_them(compositing, opened, monkeypatch):
     """All kinds, paints and joins; numbers that make a formula simpler, and whole, tiny and negative ones."""
     whole = Layer(
         (Shape.of("box", (1, 0, 1), center=(0, -1), half_size=(1e-6, 2), angle=0, corner_radius=0),), 0.0
     )
-    scene = random_scene(layers=16, seed=6, compositing=compositing, width=30, height=20)
+    scene = random_scene(layers=10, seed=6, compositing=compositing, width=30, height=20)
     scene = replace(scene, layers=(*scene.layers, whole, replace(whole, opacity=0.0)))
     with opened(page_of(scene), 300, 300) as page:
         page.evaluate(RECORD_COPIES)
