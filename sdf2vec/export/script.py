@@ -54,7 +54,7 @@ def script_parts(forms: Sequence[Form], bears: Mapping[str, int] = BEARS) -> dic
         "flat": FLAT,
         "over": OVER,
         "coarsest": COARSEST,
-        "formulas": "\n\n".join(_formulas(form.variants)),
+        "formulas": "\n\n".join(_formulas(form)),
         "drawn": _json({form.compositing: expression(form.drawn(), GLSL) for form in forms}),
         "stride": form.stride,
         "width": DATA_WIDTH,
@@ -117,8 +117,9 @@ def _compact_parts(variants: Iterable[Variant]) -> dict[str, object]:
     }
 
 
-def _formulas(variants: Iterable[Variant]) -> Iterable[str]:
+def _formulas(form: Form) -> Iterable[str]:
     """What a script computes itself: records, and boxes to make lists from."""
+    variants = form.variants
     yield "const RECORDS = {};\nconst BOXES = {};"
     for variant in variants:
         record = function_text(f'RECORDS["{" ".join(variant)}"]', record_scalars(variant), variant.scalars)
@@ -129,8 +130,9 @@ def _formulas(variants: Iterable[Variant]) -> Iterable[str]:
         inputs += [scalar for parameter in kind.parameters for scalar in parameter.scalars("_0")]
         box = function_text(f"BOXES.{kind.name}", formula.bounds(SLACK)[:4], inputs)
         yield box.removeprefix("const ")
-    smoothness = var("smoothness")
-    yield function_text("unionReach", scalarize(union_reach(MAX_JOINED, smoothness)), [smoothness])
+    if form.joins:
+        smoothness = var("smoothness")
+        yield function_text("unionReach", scalarize(union_reach(MAX_JOINED, smoothness)), [smoothness])
 
 
 def _shader_parts(forms: Sequence[Form]) -> dict[str, object]:
