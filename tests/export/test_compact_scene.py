@@ -50,12 +50,12 @@ def test_what_is_fitted_again_is_nearer_in_the_same_bits(monkeypatch):
     scene = triangles(16, 24)
     sizer = compact_scene._Sizer(scene)
     monkeypatch.setattr(compact_refit, "ROUNDS", 12)
-    bits = sizer.bits(36.0)
+    bits = sizer.bits(30.0)
     plain = written(scene, bits)
     scales = Steps.of(scene, bits).scales
     again = written(compact_scene.refitted(scene, scales), bits)
-    assert sizer.near(plain) > 35.0
-    assert sizer.near(again) > sizer.near(plain) + 0.3
+    assert sizer.near(plain) > 28.0
+    assert sizer.near(again) > sizer.near(plain) + 0.8
     assert len(again) < 1.03 * len(plain)
 
 
