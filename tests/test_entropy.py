@@ -47,13 +47,6 @@ def test_numbers_take_about_their_entropy():
     assert len(data) * 8 <= 1.08 * entropy * len(values)
 
 
-def test_carries_go_through_bytes_already_written():
-    """A thousand of the least probable bits one after another, of which nearly each adds to the low end."""
-    numbers = [("raw", ((1 << 40) - 1, 40))] * 25
-    coder = Reader(written(numbers))
-    assert [coder.raw(0, 40) for _ in numbers] == [(1 << 40) - 1] * 25
-
-
 def test_reading_on_beyond_the_end_is_refused():
     coder = Reader(written([("raw", (5, 8))]))
     with pytest.raises(EndedError):
