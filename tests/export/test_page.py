@@ -133,7 +133,7 @@ def held(scene):
 def test_a_page_holds_the_scene_once_and_hardly_less():
     found = held(SCENE)
     off = sdf2vec.render(found, 360) - sdf2vec.render(SCENE, 360)
-    assert 255 * np.abs(off).max() < 0.5
+    assert 255 * np.abs(off).max() < 1.0
     script = page_of(SCENE).partition("</svg>")[2]
     assert (
         len(page_of(replace(SCENE, layers=SCENE.layers * 3)).partition("</svg>")[2]) < len(script) + 18 * 60
@@ -146,8 +146,10 @@ def test_texts_are_those_of_the_exporter_whatever_is_in_them(compositing, opened
     whole = Layer(
         (Shape.of("box", (1, 0, 1), center=(0, -1), half_size=(1e-6, 2), angle=0, corner_radius=0),), 0.0
     )
-    scene = random_scene(layers=10, seed=6, compositing=compositing, width=30, height=20)
-    scene = replace(scene, layers=(*scene.layers, whole, replace(whole, opacity=0.0)))
+    scene = random_scene(layers=8, seed=6, compositing=compositing, width=30, height=20)
+    disc = Shape.of("circle", (1, 0, 0), center=(0.1, 0.2), radius=0.3)
+    twice = Layer.union((disc, disc), 0.1, 0.1)  # said once
+    scene = replace(scene, layers=(*scene.layers, whole, replace(whole, opacity=0.0), twice))
     with opened(page_of(scene), 300, 300) as page:
         page.evaluate(RECORD_COPIES)
         for name in ("shadertoy", "glsl", "wgsl"):
