@@ -31,7 +31,7 @@ from .shader import most_shapes
 from .svg import svg
 
 FALLBACK = 1 << 20  # pixels
-NEAR, MANY = 62.0, 256  # dB that the page's scene is from the one it was made of, where it has so many shapes
+NEAR, MANY = 64.0, 256  # dB that the page's scene is from the one it was made of, where it has so many shapes
 NEAREST = 90.0  # fewer can have more
 POLICY = "what the page may do"  # where the template has it
 SCRIPT = re.compile(r'<script type="module">(.*?)</script>', re.DOTALL)

@@ -66,10 +66,10 @@ def assert_shows(page, scene, levels=1.6):
 
 def test_page_shows_the_scene_and_follows_its_size(opened):
     with opened(page_of(SCENE), 400, 500) as page:
-        assert_shows(page, SCENE)
+        assert_shows(page, held(SCENE))
         page.set_viewport_size({"width": 641, "height": 700})
         chromium.wait_until(page, "document.querySelector('canvas').width > 550")
-        assert_shows(page, SCENE)
+        assert_shows(page, held(SCENE))
         assert not page.locator(".fallback").is_visible()
 
 
