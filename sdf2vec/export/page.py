@@ -32,7 +32,7 @@ from .svg import svg
 
 FALLBACK = 1 << 20  # pixels
 NEAR, MANY = 64.0, 256  # dB that the page's scene is from the one it was made of, where it has so many shapes
-NEAREST = 90.0  # fewer can have more
+NEAREST = 105.0  # fewer can have more
 POLICY = "what the page may do"  # where the template has it
 SCRIPT = re.compile(r'<script type="module">(.*?)</script>', re.DOTALL)
 STYLE = re.compile(r"<style>(.*?)</style>", re.DOTALL)
@@ -69,8 +69,8 @@ def html(scene: Scene, options: Options) -> Exported:
 
 
 def _aim(shapes: int) -> float:
-    """How near the page's scene is to be: half as many shapes can have numbers that are twice as fine."""
-    return min(NEAR + 20.0 * math.log10(max(1.0, MANY / max(shapes, 1))), NEAREST)
+    """How near the page's scene is to be: half as many shapes can have numbers that are nearly three times as fine."""
+    return min(NEAR + 30.0 * math.log10(max(1.0, MANY / max(shapes, 1))), NEAREST)
 
 
 def _form(scene: Scene) -> Form:
