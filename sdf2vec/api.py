@@ -84,7 +84,7 @@ def render(scene: Scene, width: int | None = None, height: int | None = None) ->
 
 
 def export(scene: Scene, target: str, **options: Unpack[ExportKeywords]) -> str | bytes:
-    """The scene in a target format, a key of `sdf2vec.export.EXPORTERS`: text, or bytes for "pdf" and pictures.
+    """The scene in a target format, a key of `sdf2vec.export.EXPORTERS`: text, or bytes for "pdf", "sdf" and pictures.
 
     Options: those of `exported`. Raises Sdf2vecError, also for a size limit that can't be kept to.
     """

@@ -207,7 +207,7 @@ def test_an_export_is_text_or_bytes(target):
     scene = red_circle()
     data = sdf2vec.export(scene, target)
     assert data == sdf2vec.export(sdf2vec.loads(sdf2vec.dumps(scene)), target)
-    assert isinstance(data, bytes if target in ("png", "jpg", "webp", "pdf") else str)
+    assert isinstance(data, bytes if target in ("png", "jpg", "webp", "sdf", "pdf") else str)
 
 
 def test_export_options_have_the_words_of_the_command_line():
