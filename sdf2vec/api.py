@@ -86,7 +86,7 @@ def render(scene: Scene, width: int | None = None, height: int | None = None) ->
 def export(
     scene: Scene, target: str, *, picture: PictureSource | None = None, **options: Unpack[ExportKeywords]
 ) -> str | bytes:
-    """The scene in a target format, a key of `sdf2vec.export.EXPORTERS`: text, or bytes for "pdf" and pictures.
+    """The scene in a target format, a key of `sdf2vec.export.EXPORTERS`: text, or bytes for "pdf", "sdf" and pictures.
 
     Options: those of `exported`. Raises Sdf2vecError, also for a size limit that can't be kept to.
     """
@@ -113,7 +113,7 @@ def _png(scene: Scene) -> str:
     return b64encode(exported(scene, "png", size=min(NOTEBOOK, scene.width, scene.height)).raw).decode()
 
 
-SHOWN |= {"image/png": _png, "image/svg+xml": lambda scene: str(export(scene, "svg"))}
+SHOWN |= {"image/png": _png, "image/svg+xml": lambda scene: str(export(scene, "svg", svg_size="fixed"))}
 
 
 def check(

@@ -41,7 +41,7 @@ round_trips: Callable[..., list[Check]] = deferred("sdf2vec.roundtrip", "check")
 legend: Callable[[], str] = deferred("sdf2vec.roundtrip", "legend")
 escape: Callable[[str], str] = deferred("rich.markup", "escape")
 
-SET_HERE = ("alone", "original")  # options of exports that have no flag
+SET_HERE = ("alone", "near", "original")  # options of exports that have no flag
 OF_FITS = (
     "with_original",
     "recursive",
@@ -228,7 +228,7 @@ def _export_command(arguments: list[str]) -> int:
 
 def _scene_parser(command: str, does: str) -> argparse.ArgumentParser:
     parser = _Parser(prog=f"sdf2vec {command}", description=does)
-    parser.add_argument("scene", help="a .scene.json file; - reads standard input")
+    parser.add_argument("scene", help="a .scene.json or .sdf file; - reads standard input")
     return parser
 
 
@@ -318,9 +318,10 @@ def _completion_command(arguments: list[str]) -> int:
 
 def _scene_and_files(files: Sequence[str]) -> tuple[str, list[str]]:
     scenes = [path for path in files if path == STREAM or path.lower().endswith(".json")]
+    scenes = scenes or [path for path in files if path.lower().endswith(EXPORTERS["sdf"].suffix)]
     scene = scenes[0] if len(scenes) == 1 else files[0] if len(files) == 1 else None
     if scene is None:
-        raise Sdf2vecError(f"one scene file (.json) is needed, got {len(scenes)}: {', '.join(files)}")
+        raise Sdf2vecError(f"one scene file (.json or .sdf) is needed, got {len(scenes)}: {', '.join(files)}")
     return scene, [path for path in files if path != scene]
 
 

@@ -11,6 +11,7 @@ from msgspec.structs import replace
 
 from . import api, guard
 from .checkpoint import Checkpoint
+from .compact_file import is_compact
 from .deferred import deferred
 from .errors import Sdf2vecError
 from .export import EXPORTERS
@@ -91,7 +92,8 @@ def convert(job: Job, work: Work, teller: Teller, stop: Stop) -> Done:
     if is_lettering(picture.pixels):
         teller.say(f"  {HINT}")
     original = _original(data(), picture) if work.running.with_original else None
-    written = write_exports(scene, job, replace(work.export, original=original), teller, picture)
+    export = replace(work.export, original=original, near=quality.psnr)
+    written = write_exports(scene, job, export, teller, picture)
     checkpoint.remove()
     seconds = time.perf_counter() - started
     teller.say(f"  {seconds:.1f} s in all{_phases(teller)}")
@@ -153,7 +155,8 @@ def _original(data: bytes, picture: Picture) -> bytes:
 def _is_scene(path: str) -> bool:
     try:
         with open(path, "rb") as stream:
-            return f'"{FORMAT}"'.encode() in stream.read(200)
+            start = stream.read(200)
+            return is_compact(start) or f'"{FORMAT}"'.encode() in start
     except OSError:
         return False
 

@@ -56,13 +56,15 @@ class ExportKeywords(TypedDict, total=False):
 
     size: int | None
     glsl: Literal["es300", "330", "es100"]
-    layout: Literal["auto", "readable", "table", "tiled", "packed", "data"]
+    layout: Literal["auto", "readable", "table", "tiled", "packed", "data", "buffer"]
     framing: Literal["fit", "cover", "crop"] | None
     animate: bool
     svg_profile: Literal["filters", "portable", "inkscape"]
     svg_fidelity: Literal["picture", "render", "exact"]
+    svg_size: Literal["responsive", "fixed"]
     max_bytes: str | int | None
     title: str
     alt: str
     alone: bool
+    near: float | None
     original: bytes | None

@@ -234,13 +234,18 @@ def _shader(trip: RoundTrip, made: Exported, scene: Scene, width: int, height: i
 
 
 def _shadertoy(trip: RoundTrip, made: Exported, scene: Scene, width: int, height: int) -> Pixels:
-    text = f"{SHADERTOY_HEAD}{made.data!s}{SHADERTOY_TAIL}"
-    return trip.drawn(text, width, height, uniforms={"iResolution": (width, height, 1.0)})
+    first, *rest = str(made.data).split(IMAGE_TAB)
+    uniforms = {"iResolution": (width, height, 1.0), "iFrame": 0}
+    pixels = trip.drawn(f"{SHADERTOY_HEAD}{first}{SHADERTOY_TAIL}", width, height, uniforms=uniforms)
+    for tab in rest:  # which reads what was drawn, from below
+        text = f"{SHADERTOY_HEAD}{tab}{SHADERTOY_TAIL}"
+        pixels = trip.drawn(text, width, height, uniforms=uniforms, texture=pixels[::-1])
+    return pixels
 
 
 def _pasted(trip: RoundTrip, made: Exported, scene: Scene, width: int, height: int) -> Pixels:
-    """By a client that puts around it what Shadertoy does."""
-    return trip.drawn(made.data, width, height)
+    """By a client that puts around it what Shadertoy does; of two tabs the first, which has the whole picture."""
+    return trip.drawn(str(made.data).partition(IMAGE_TAB)[0], width, height)
 
 
 def _godot(trip: RoundTrip, made: Exported, scene: Scene, width: int, height: int) -> Pixels:
@@ -258,6 +263,13 @@ def _element(trip: RoundTrip, made: Exported, scene: Scene, width: int, height: 
     return premultiply(trip.drawn(made.data, width, height, scene=dumps(scene)))
 
 
+def _in_element(trip: RoundTrip, made: Exported, scene: Scene, width: int, height: int) -> Pixels:
+    """A compact scene, or its address, in the element that shows such."""
+    data = base64.b64decode(made.data.partition(",")[2]) if isinstance(made.data, str) else made.data
+    element = Exports(scene).export("component").data
+    return premultiply(trip.drawn(element, width, height, scene=data))
+
+
 def _decoded(trip: RoundTrip, made: Exported, scene: Scene, width: int, height: int) -> Pixels:
     """The drawing that an address holds."""
     head, _, rest = str(made.data).partition(",")
@@ -269,13 +281,17 @@ def _svg(target: str, profile: str, *engines: str) -> tuple[RoundTrip, ...]:
     return tuple(RoundTrip(target, engine, _whole, False, profile) for engine in engines)
 
 
+IMAGE_TAB = "// --- Image ---"  # where the second tab of a text begins
+
 # What Shadertoy puts around a pasted text.
 SHADERTOY_HEAD = """#version 300 es
 precision highp float;
 precision highp int;
 uniform vec3 iResolution;
 uniform float iTime;
+uniform int iFrame;
 uniform vec4 iMouse;
+uniform highp sampler2D iChannel0;
 out vec4 shadertoy_out_color;
 """
 SHADERTOY_TAIL = """
@@ -314,4 +330,6 @@ ROUND_TRIPS: dict[str, tuple[RoundTrip, ...]] = {
     "pdf": (RoundTrip("pdf", "pdfium", _whole, False),),
     "html": (RoundTrip("html", "page", _whole, False),),
     "component": (RoundTrip("component", "element", _element, False),),
+    "sdf": (RoundTrip("sdf", "element", _in_element, False),),
+    "sdf-uri": (RoundTrip("sdf-uri", "element", _in_element, False),),
 }

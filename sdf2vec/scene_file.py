@@ -16,6 +16,7 @@ import msgspec
 from msgspec import Meta
 
 from .blend import JOINS, UNION
+from .compact_file import is_compact, read
 from .errors import Sdf2vecError
 from .files import one_line, write_atomically
 from .layer import JOIN, LOOK, Part
@@ -109,7 +110,9 @@ def _short(value: Any) -> Any:
 
 
 def loads(text: str | bytes) -> Scene:
-    """A scene from JSON text. Raises SceneError, whose one line names the offending field."""
+    """A scene from JSON text, or from a compact file. Raises SceneError, whose one line names the offending field."""
+    if isinstance(text, bytes) and is_compact(text):
+        return read(text)
     data = _object(_parse(text))
     if data.get("format") != FORMAT:
         raise SceneError("format", f"must be {FORMAT!r}, got {shown(data.get('format'))}; not a scene file")
@@ -128,7 +131,7 @@ def loads(text: str | bytes) -> Scene:
 
 
 def load(path: str | os.PathLike[str]) -> Scene:
-    """A scene from a JSON file. Raises Sdf2vecError, whose one line names the file and the field."""
+    """A scene from a file, JSON or compact. Raises Sdf2vecError, whose one line names the file and the field."""
     try:
         return loads(Path(path).read_bytes())
     except SceneError as error:

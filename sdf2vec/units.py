@@ -55,7 +55,7 @@ class Fractions(NamedTuple):
     ranges: Mapping[str, tuple[float, float]]
 
 
-def _itself(value: float) -> float:
+def _itself(value: Any) -> Any:
     return value
 
 
@@ -64,13 +64,25 @@ class Codec:
     """How a packed scene says a number: `decode` gives its value from a fraction 0..1.
 
     `precision`: whose bits it has: "place" (as many as the layer's edge needs) or those of a field of its own. The
-    `root` of a value is linear in its fraction; `value` is that of a root.
+    `root` of a value, or of many, is linear in its fraction; `value` is that of a root. `formula`: the same as an
+    expression. A number is near the one of its unit that stands `stride` numbers before it in the same shape, if that
+    is not 0.
     """
 
     decode: Callable[[Expr, Fractions], Expr]
     precision: str = "place"
-    root: Callable[[float], float] = _itself
-    value: Callable[[float], float] = _itself
+    root: Callable[[Any], Any] = _itself
+    value: Callable[[Any], Any] = _itself
+    formula: Callable[[Expr], Expr] = _itself
+    stride: int = 0
+
+    def step(self, value: Any, start: float, end: float, most: int) -> Any:
+        """Which of the steps 0 to `most` between two roots a value lies at, not rounded, and beyond the ends, too."""
+        return (self.root(value) - start) * (most / (end - start) if end > start else 0.0)
+
+    def said(self, step: Any, start: float, end: float, most: int) -> Any:
+        """The value of a step."""
+        return self.value(start + (end - start) * step / most)
 
 
 @dataclass(frozen=True, eq=False)
@@ -212,14 +224,12 @@ def grown(root: Expr) -> Expr:
     return power * power - GRAIN
 
 
-def _grown(root: float) -> float:
-    power: float = root**ROOT
-    return power - GRAIN
+def _grown(root: Any) -> Any:
+    return root**ROOT - GRAIN
 
 
-def _root(length: float) -> float:
-    root: float = (length + GRAIN) ** (1.0 / ROOT)
-    return root
+def _root(length: Any) -> Any:
+    return (length + GRAIN) ** (1.0 / ROOT)
 
 
 def _place_in_box(v: Expr, of: Fractions) -> Expr:
@@ -253,7 +263,7 @@ def _grown_between(unit: str) -> Callable[[Expr, Fractions], Expr]:
     return decode
 
 
-_PLACE, _SPAN = Codec(_place_in_box), Codec(_share_of_span)
+_PLACE, _SPAN = Codec(_place_in_box, stride=2), Codec(_share_of_span)
 _TURN = Codec(lambda v, of: v * math.tau)
 
 
@@ -299,7 +309,7 @@ COLOR = Unit(
     1.0,
     0.014,
     _keep_color,
-    Codec(_between("color"), "color"),
+    Codec(_between("color"), "color", stride=1),
     decimals=COLOR_DECIMALS,
     crowded=True,
 )
@@ -319,7 +329,7 @@ FALLOFF = Unit(
     LONGEST_CANVAS,
     0.01,
     _keep_falloff,
-    Codec(_grown_between("falloff"), "falloff", _root, _grown),
+    Codec(_grown_between("falloff"), "falloff", _root, _grown, grown),
     scaling=1,
     crowded=True,
 )
@@ -329,7 +339,7 @@ SMOOTHNESS = Unit(
     LONGEST_CANVAS,
     0.003,
     _keep_within(1e-3, LONGEST),
-    Codec(_grown_between("smoothness"), "falloff", _root, _grown),
+    Codec(_grown_between("smoothness"), "falloff", _root, _grown, grown),
     scaling=1,
     crowded=True,
 )
@@ -339,6 +349,6 @@ BACKGROUND = Unit(
     1.0,
     0.01,
     _keep_within(0.0, 1.0),
-    Codec(_between("color"), "color"),
+    Codec(_between("color"), "color", stride=1),
     decimals=COLOR_DECIMALS,
 )

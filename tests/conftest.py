@@ -7,10 +7,11 @@ from importlib.util import find_spec
 
 import pytest
 
-from sdf2vec.engines import ENGINES, glslang
+from sdf2vec.engines import ENGINES, glslang, svgo
 
 MISSING = {name: engine.missing for name, engine in ENGINES.items()} | {
     "glslang": glslang.missing,
+    "svgo": svgo.missing,
     "triton": lambda: None if find_spec("triton") else "not installed",
 }
 

@@ -207,7 +207,7 @@ def test_an_export_is_text_or_bytes(target):
     scene = red_circle()
     data = sdf2vec.export(scene, target)
     assert data == sdf2vec.export(sdf2vec.loads(sdf2vec.dumps(scene)), target)
-    assert isinstance(data, bytes if target in ("png", "jpg", "webp", "pdf") else str)
+    assert isinstance(data, bytes if target in ("png", "jpg", "webp", "sdf", "pdf") else str)
 
 
 def test_export_options_have_the_words_of_the_command_line():
@@ -352,7 +352,7 @@ def test_a_notebook_shows_a_scene():
     with Image.open(io.BytesIO(base64.b64decode(bundle["image/png"]))) as image:
         assert image.size == (24, 16)
     drawing = scene._repr_mimebundle_(include={"image/svg+xml"})
-    assert drawing == {"image/svg+xml": sdf2vec.export(scene, "svg")}
+    assert drawing == {"image/svg+xml": sdf2vec.export(scene, "svg", svg_size="fixed")}
     assert scene._repr_mimebundle_(exclude={"image/png"}) == {}
     wide = Scene(4000, 2000, scene.layers)
     with Image.open(io.BytesIO(base64.b64decode(wide._repr_mimebundle_()["image/png"]))) as image:

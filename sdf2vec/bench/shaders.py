@@ -166,6 +166,12 @@ def page(scenes: dict[int, Scene], name: str, command: str) -> str:
         f"Default Shadertoy text at 256 shapes: {len(default.text):,} bytes, {default.about}, measured on a full HD "
         f"canvas. Hosts are warned of above {TEXT_LIMIT // 1024} KiB.",
         "",
+        "`--layout buffer` writes a Shadertoy of two tabs, marked `// --- Buffer A ---` and `// --- Image "
+        "---`, which both have Buffer A as iChannel0. Buffer A draws the picture in the first frame, and "
+        "where `iResolution` is not what the alpha of its first two texels keeps beside the alpha itself; "
+        "else it repeats itself. The Image tab shows it. So a frame costs two reads of a texture, however "
+        "many shapes there are; nothing moves.",
+        "",
         "| target | layout | shapes | depth | bytes | engine | compile s | first frame s | frame s | error |",
         "|---|---|---:|---:|---:|---|---:|---:|---:|---:|",
     )

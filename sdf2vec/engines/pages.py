@@ -54,9 +54,10 @@ def image(address: str, width: int, height: int) -> Picture:
         return screenshot(shown)
 
 
-def element(module: str, width: int, height: int, scene: str) -> Picture:
-    """A scene file in the element that a module defines."""
-    files = {"index.html": ELEMENT, "sdf-image.js": module, "picture.scene.json": scene}
+def element(module: str, width: int, height: int, scene: str | bytes) -> Picture:
+    """A scene file, JSON or compact, in the element that a module defines."""
+    files: dict[str, str | bytes] = {"index.html": ELEMENT, "sdf-image.js": module}
+    files["picture.scene.json"] = scene
     with opened(files, width, height) as shown:
         _wait_for(
             shown, "document.querySelector('sdf-image').shadowRoot?.querySelector('canvas')", width, height

@@ -6,6 +6,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import partial
 
+from ..compact_file import MAGIC
 from ..deferred import deferred
 from ..errors import Sdf2vecError
 from ..grain import Grain
@@ -84,11 +85,28 @@ def _shader(
 
 
 def _svg(name: str, suffix: str, about: str, endings: tuple[str, ...] = ()) -> Exporter:
-    module, heeds = "sdf2vec.export.svg", ("svg_profile", "svg_fidelity", "max_bytes", "title", "alt")
+    module = "sdf2vec.export.svg"
+    heeds = ("svg_profile", "svg_fidelity", "svg_size", "max_bytes", "title", "alt")
     accepts, forms = deferred(module, "accepts"), deferred(module, f"{name}_forms")
     draws, draw = deferred(module, "draws"), deferred(module, f"small_{name}")
     return Exporter(
         suffix, deferred(module, name), about, accepts, heeds, endings, forms=forms, draws=draws, draw=draw
+    )
+
+
+def _compact(
+    name: str, suffix: str, about: str, endings: tuple[str, ...] = (), is_text: bool = False
+) -> Exporter:
+    module = "sdf2vec.export.compact_scene"
+    return Exporter(
+        suffix,
+        deferred(module, name),
+        about,
+        heeds=("max_bytes",),
+        other_endings=endings,
+        mark=MAGIC,
+        forms=deferred(module, f"{name}_forms"),
+        is_text=is_text,
     )
 
 
@@ -160,6 +178,8 @@ EXPORTERS: dict[str, Exporter] = {
         other_endings=(".json",),
         mark=f'"format": "{FORMAT}"'.encode(),
     ),
+    "sdf": _compact("sdf", ".sdf", "the scene in few bytes, for <sdf-image>"),
+    "sdf-uri": _compact("sdf_uri", ".sdf.txt", "the same as a data URI", is_text=True),
     "png": _raster("png", "the render, at any --size"),
     "jpg": _raster("jpg", "the same as JPEG", ".jpeg"),
     "webp": _raster("webp", "the same as WebP"),

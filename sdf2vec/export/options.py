@@ -12,9 +12,12 @@ from ..declared import choice, number, plain
 from ..scene import Scene
 
 GLSL_VERSIONS = {"es300": "300 es", "330": "330", "es100": "100"}
-LAYOUTS = ("auto", "readable", "table", "tiled", "packed", "data")
+BUFFER = "buffer"  # a Shadertoy of two tabs
+LAYOUTS = ("auto", "readable", "table", "tiled", "packed", "data", BUFFER)
 SVG_PROFILES = ("filters", "portable", "inkscape")
 PICTURE, RENDER, EXACT = SVG_FIDELITIES = ("picture", "render", "exact")
+FIXED = "fixed"
+SVG_SIZES = ("responsive", FIXED)
 
 
 Size = Annotated[int, number("size in pixels", "PIXELS", 1, 16384, "shortest side of a PNG, JPEG or WebP")]
@@ -54,6 +57,10 @@ class Options(Struct, frozen=True, kw_only=True):
             SVG_FIDELITIES,
         ),
     ] = PICTURE
+    svg_size: Annotated[
+        str,
+        choice("SVG size", "an SVG as large as where it is put, or as the picture, in pixels", SVG_SIZES),
+    ] = SVG_SIZES[0]
     max_bytes: (
         Annotated[
             str | int,
@@ -68,6 +75,7 @@ class Options(Struct, frozen=True, kw_only=True):
     title: Annotated[str, plain("what an export calls the picture (default: its name)", "TEXT")] = "a picture"
     alt: Annotated[str, plain("what is in the picture, for who can't see an SVG or a page", "TEXT")] = ""
     alone: Annotated[bool, plain("no files beside the text")] = False
+    near: Annotated[float | None, plain("dB that the scene is from the picture it was fitted to")] = None
     original: Annotated[bytes | None, plain("PNG, JPEG or WebP that a page compares with")] = None
 
 

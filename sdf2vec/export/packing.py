@@ -410,9 +410,10 @@ class _Coder:
         """What the fraction with so many bits stands for that comes nearest to a value."""
         codec, most = parameter.unit.codec, (1 << bits) - 1
         value = value % math.tau if parameter.unit is ANGLE else value
-        start, end, root = (codec.root(v) for v in (low, high, value))
-        share = min(max((root - start) / (end - start), 0.0), 1.0) if end > start else 0.0
-        return codec.value(start + (end - start) * self.whole(round(share * most), bits) / most)
+        start, end = codec.root(low), codec.root(high)
+        step = round(min(max(codec.step(value, start, end, most), 0.0), most))
+        said: float = codec.said(self.whole(step, bits), start, end, most)
+        return said
 
 
 def _legal(value: float, parameter: Parameter) -> float:

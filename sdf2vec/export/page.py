@@ -1,42 +1,54 @@
-"""One HTML file that shows a scene: a shader where there is WebGL 2, else a drawing. It loads nothing."""
+"""One HTML file that shows a scene: a shader where there is WebGL 2, else a drawing. It loads nothing.
+
+It holds the scene once, as a compact file, from which its script makes what is drawn and the texts that it copies.
+"""
 
 from __future__ import annotations
 
 import base64
 import hashlib
 import json
+import math
 import re
 from html import escape
 
-import numpy as np
 from msgspec.structs import replace
 
+from ..compact_file import read
 from ..errors import Sdf2vecError
 from ..files import one_line, shown_as
 from ..limits import TEXT_SHAPES
 from ..scene import Scene
 from ..templating import template
+from .compact_scene import fine
 from .exported import Exported
 from .options import Options
+from .page_texts import PageTexts
 from .raster import png
-from .shader import DATA_WIDTH, Shader, most_shapes, shader
+from .records import Form, Variant, form_of
+from .script import BEARS_ITS_OWN, script_parts
+from .shader import most_shapes
 from .svg import svg
 
 FALLBACK = 1 << 20  # pixels
+NEAR, MANY = 64.0, 256  # dB that the page's scene is from the one it was made of, where it has so many shapes
+NEAREST = 105.0  # fewer can have more
 POLICY = "what the page may do"  # where the template has it
 SCRIPT = re.compile(r'<script type="module">(.*?)</script>', re.DOTALL)
 STYLE = re.compile(r"<style>(.*?)</style>", re.DOTALL)
+REMARK = re.compile(r"(^|[ \t])[ \t]*// .*$", re.MULTILINE)
+SPACE = re.compile(r"^[ \t]*\n|^[ \t]+|[ \t]+$", re.MULTILINE)
 LABELS = {"shadertoy": "Shadertoy", "glsl": "GLSL", "wgsl": "WGSL", "svg": "SVG"}
 
 
 def html(scene: Scene, options: Options) -> Exported:
     """A page that needs no network, with buttons that copy the scene in other forms."""
     plain = Options(title=options.title, alt=options.alt)
-    made = shader(scene, "glsl", replace(plain, layout="data"))
     alone = replace(plain, alone=True)
     served = [name for name in LABELS if name != "svg" and scene.shape_count <= most_shapes(alone, name)]
-    texts = {name: shader(scene, name, alone).text for name in served}
-    drawing = _drawing(scene, plain)
+    drawing, file = _drawing(scene, plain), fine(scene, _aim(scene.shape_count))
+    held = read(file)
+    texts = PageTexts.of(held, served, alone)
     text = template("page.html.jinja").render(
         scene=scene,
         title=one_line(options.title),
@@ -46,12 +58,29 @@ def html(scene: Scene, options: Options) -> Exported:
         labels={
             name: label for name, label in LABELS.items() if name in served or (name == "svg" and drawing)
         },
-        texts=json.dumps({"fragment": made.text, **texts}, ensure_ascii=False).replace("<", "\\u003c"),
-        data=base64.b64encode(_floats(made)).decode(),
-        width=DATA_WIDTH,
+        texts=json.dumps(texts.texts, ensure_ascii=False).replace("<", "\\u003c"),
+        file=base64.b64encode(file).decode(),
+        places="\n".join(texts.functions),
         policy=POLICY,
+        **script_parts([_form(held)], BEARS_ITS_OWN),
     )
+    text = SCRIPT.sub(lambda match: f'<script type="module">{_lean(match[1])}</script>', text)
     return Exported(text.replace(POLICY, policy_of(text), 1))
+
+
+def _aim(shapes: int) -> float:
+    """How near the page's scene is to be: half as many shapes can have numbers that are nearly three times as fine."""
+    return min(NEAR + 30.0 * math.log10(max(1.0, MANY / max(shapes, 1))), NEAREST)
+
+
+def _form(scene: Scene) -> Form:
+    """The form of the scene's records; of one without any that of some."""
+    return form_of(scene) if scene.layers else Form((Variant("circle"),), (), scene.compositing)
+
+
+def _lean(script: str) -> str:
+    """A script without remarks, indents and empty lines."""
+    return SPACE.sub("", REMARK.sub("", script))
 
 
 def policy_of(page: str) -> str:
@@ -74,11 +103,6 @@ def _drawing(scene: Scene, options: Options) -> str:
     except Sdf2vecError:
         return ""
     return drawing[drawing.index("<svg") :].strip()
-
-
-def _floats(made: Shader) -> bytes:
-    data = np.zeros((1, DATA_WIDTH, 4), "<f4") if made.data is None else made.data.astype("<f4")
-    return data.tobytes()
 
 
 def _image(scene: Scene, options: Options) -> str:

@@ -38,7 +38,7 @@ from .layouts import (
     Host,
     choose,
 )
-from .options import GLSL_VERSIONS, Options
+from .options import BUFFER, GLSL_VERSIONS, Options
 from .records import BELOW, COUNT, JOIN, OWN, Form, first_records, form_of, records, slot
 from .tiles import COARSEST, Tiles
 
@@ -59,6 +59,7 @@ class Target:
     has_knobs: bool = False  # names on top for people to change; it knows the time, and the mouse
     surface: str = ""  # what holds the place on a mesh, 0..1 with y down, where there is no canvas
     framing: str = "fit"  # unless told
+    buffered: bool = False  # in two tabs, the first of which draws once for every size of the canvas
 
 
 TARGETS = {
@@ -81,11 +82,14 @@ class Shader:
     choice: Choice
     data: Float32Array | None = None
     error: float = 0.0
+    buffered: bool = False
 
     @property
     def about(self) -> str:
         """One line on the layout, with a warning where a host may refuse the text."""
         line = str(self.choice)
+        if self.buffered:
+            line += ", in Buffer A; its iChannel0 and that of the Image tab are Buffer A"
         if self.error:
             line += f", off by at most {self.error:.2f} levels"
         if len(self.text) > TEXT_LIMIT and self.choice.layout != "data":
@@ -113,7 +117,7 @@ def forms(scene: Scene, options: Options, name: str, suffix: str) -> list[Callab
         return Exported(text, {}, (f"{best.about}; without comments, names and spaces",), best.error)
 
     finest = partial(exported, scene, options, name, suffix)
-    return [finest] if target.host is EMBEDDED else [finest, densest]
+    return [finest] if target.host is EMBEDDED or options.layout == BUFFER else [finest, densest]
 
 
 def shader(scene: Scene, name: str, options: Options) -> Shader:
@@ -122,6 +126,8 @@ def shader(scene: Scene, name: str, options: Options) -> Shader:
     What is pasted is readable unless told, where a host takes so much text; else as small as can be.
     """
     target = TARGETS[name]
+    if target.host is PASTED and options.layout == BUFFER:
+        target, options = _buffered(target, options)
     if target.host is not PASTED or options.layout != "auto":
         return _shader(scene, target, options)
     if scene.shape_count <= MOST_READABLE:
@@ -129,6 +135,15 @@ def shader(scene: Scene, name: str, options: Options) -> Shader:
         if len(made.text.encode()) <= TEXT_LIMIT:
             return made
     return _shader(scene, target, structs.replace(options, layout="packed"))
+
+
+def _buffered(target: Target, options: Options) -> tuple[Target, Options]:
+    """The target and the options for two tabs. Raises Sdf2vecError for what moves."""
+    if options.animate:
+        raise Sdf2vecError(
+            f"what breathes is drawn in every frame; leave out --layout {BUFFER}, or --animate"
+        )
+    return replace(target, has_knobs=False, buffered=True), structs.replace(options, layout="auto")
 
 
 def _shader(scene: Scene, target: Target, options: Options) -> Shader:
@@ -144,6 +159,7 @@ def _shader(scene: Scene, target: Target, options: Options) -> Shader:
         knobs=knobs_of(job.say(_background(scene)), choice.layout, bool(slack)) if target.has_knobs else [],
         background=job.say(job.ground),
         version=GLSL_VERSIONS[options.glsl],
+        buffered=target.buffered,
         output="gl_FragColor" if options.glsl == "es100" else "fragColor",
         display="" if job.is_displayable else "display",
         cropped=job.say(cropped(SEEN, P, _size(scene), job.ground)) if job.framing == CROP else "",
@@ -151,7 +167,21 @@ def _shader(scene: Scene, target: Target, options: Options) -> Shader:
         place=expression(surface_point(var(target.surface, VEC2), _size(scene)), target.dialect),
         **(dict.fromkeys(("table", "packed", "tiles", "data")) | {"layers": []} | parts),
     )
-    return Shader(_dense(text) if choice.layout == "packed" else text, choice, data, error)
+    said = _dense(text) if choice.layout == "packed" else text
+    return Shader(said, choice, data, error, target.buffered)
+
+
+def statements_of(scene: Scene, name: str, options: Options, first: int = 0) -> list[tuple[str, list[str]]]:
+    """What a readable text says of each layer: a remark and statements; the shapes are numbered from `first` on."""
+    target = TARGETS[name]
+    chosen = structs.replace(options, layout="readable")
+    job = _Job(scene, target, chosen, Choice("readable", None, 0, 0.0, 0.0), 0.0)
+    return _statements(job, first)
+
+
+def statements_text(layers: Iterable[tuple[str, list[str]]]) -> str:
+    """The lines of a text that say the layers."""
+    return template("layers.jinja").render(layers=list(layers))
 
 
 def _dense(text: str) -> str:
@@ -268,13 +298,21 @@ def _background(scene: Scene) -> Expr:
 
 
 def _readable(job: _Job) -> dict[str, Any]:
-    firsts = first_records(job.scene.layers).tolist()
-    layers = [_layer(layer, first, job) for layer, first in zip(job.scene.layers, firsts, strict=True)]
-    texts = [statements("c = {};", layer, job.dialect) for layer in layers]
-    remarks = [
-        f"{first} {_named(layer.structure)}" for first, layer in zip(firsts, job.scene.layers, strict=True)
+    layers = [_layer(layer, first, job) for layer, first in _numbered(job)]
+    return {"functions": job.functions(layers), "layers": _statements(job)}
+
+
+def _numbered(job: _Job, first: int = 0) -> list[tuple[Layer, int]]:
+    """The layers with the number of the first shape of each."""
+    return list(zip(job.scene.layers, (first_records(job.scene.layers) + first).tolist(), strict=True))
+
+
+def _statements(job: _Job, first: int = 0) -> list[tuple[str, list[str]]]:
+    """For each layer a remark and statements."""
+    return [
+        (f"{index} {_named(layer.structure)}", statements("c = {};", _layer(layer, index, job), job.dialect))
+        for layer, index in _numbered(job, first)
     ]
-    return {"functions": job.functions(layers), "layers": list(zip(remarks, texts, strict=True))}
 
 
 def _named(structure: Structure) -> str:

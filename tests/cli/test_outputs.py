@@ -29,7 +29,7 @@ def test_names_of_all_outputs(folder, run):
     assert (folder / "photo.glsl").read_text().startswith("#version 300 es\n// photo in 5 shapes")
     assert "mainImage" in (folder / "photo.shadertoy.glsl").read_text()
     assert "@fragment" in (folder / "photo.wgsl").read_text()
-    assert ElementTree.parse(folder / "photo.svg").getroot().get("width") == "24"
+    assert ElementTree.parse(folder / "photo.svg").getroot().get("viewBox") == "0 0 24 16"
     assert sdf2vec.load(folder / "photo.scene.json").shape_count == 5
     with Image.open(folder / "photo.render.png") as rendered:
         assert (rendered.size, rendered.mode) == ((24, 16), "RGB")

@@ -131,3 +131,18 @@ def test_a_conversion_needs_no_engine(folder, run):
     outcome = run("photo.jpg", *SHORT, "--emit", "glsl,svg")
     assert outcome.code == 0
     assert b"draws it" not in outcome.out
+
+
+def test_a_compact_scene_is_written_and_taken_for_a_scene(folder, run):
+    assert run("photo.jpg", *SHORT, "--emit", "sdf,json").code == 0
+    assert (folder / "photo.sdf").stat().st_size < 140
+    assert run("render", "photo.sdf", "-o", "out.png").code == 0
+    assert run("export", "photo.sdf", "--emit", "glsl", "-o", "a.glsl").code == 0
+    scene = sdf2vec.load(folder / "photo.sdf")
+    assert (folder / "a.glsl").read_text() == sdf2vec.export(scene, "glsl", title="photo")
+    assert run("photo.jpg", *SHORT, "--emit", "sdf").code == 0  # its own file is replaced
+    (folder / "foreign.sdf").write_bytes(b"something else")
+    assert_refused(run("photo.jpg", *SHORT, "-o", "foreign.sdf"), "foreign.sdf", "not made by sdf2vec")
+    assert_refused(run("photo.sdf", *SHORT, "--emit", "svg"), "is a scene, not a picture")
+    (folder / "short.sdf").write_bytes((folder / "photo.sdf").read_bytes()[:-20])
+    assert_refused(run("render", "short.sdf"), "short.sdf: ")

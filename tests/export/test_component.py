@@ -1,6 +1,9 @@
 """The web component in a real browser, and the JavaScript that its formulas are lowered to."""
 
+import base64
 import json
+import random
+from contextlib import contextmanager
 from dataclasses import replace
 
 import numpy as np
@@ -8,6 +11,7 @@ import pytest
 
 import sdf2vec
 from sdf2vec import Scene
+from sdf2vec.compact_file import PRECISIONS, written
 from sdf2vec.engines import chromium
 from sdf2vec.engines.pages import ELEMENT
 from sdf2vec.expr import var
@@ -26,6 +30,21 @@ def opened(require_engine):
     def show(scene, width, height, page=ELEMENT):
         files = {"index.html": page, "sdf-image.js": module(), "picture.scene.json": scene}
         return chromium.opened(files, width, height)
+
+    return show
+
+
+@pytest.fixture
+def reading(require_engine):
+    """A page whose function `read` reads scenes as the element does."""
+    require_engine("chromium")
+
+    @contextmanager
+    def show():
+        files = {"index.html": MODULE, "sdf-image.js": f"{module()}\nwindow.read = sceneOf;"}
+        with chromium.opened(files, 50, 50) as page:
+            chromium.wait_until(page, "Boolean(window.read)", seconds=10)
+            yield page
 
     return show
 
@@ -58,6 +77,43 @@ def test_it_shows_a_scene_file_and_follows_its_size(compositing, opened):
         assert page.get_by_role("img", name="A picture").count() == 1
         page.set_viewport_size({"width": 120, "height": 80})
         assert_shows(page, scene, 120, 80)
+
+
+@pytest.mark.parametrize("compositing", ["over", "additive"])
+def test_compact_scenes_are_read_as_python_reads_them(compositing, reading):
+    """To the last digit, whatever kinds, paints, joins and ground there are."""
+    scenes = [
+        random_scene(compositing=compositing, layers=14, seed=seed, transparent=bool(seed))
+        for seed in range(2)
+    ]
+    files = [written(scene, dict.fromkeys(PRECISIONS, bits)) for scene in scenes for bits in (5, 13)]
+    with reading() as page:
+        for file in files:
+            compact, plain = base64.b64encode(file).decode(), json.loads(dumps(sdf2vec.loads(file)))
+            found = page.evaluate(
+                "(data) => read(Uint8Array.from(atob(data), (c) => c.charCodeAt(0)))", compact
+            )
+            assert found == page.evaluate("(scene) => read(scene)", plain)
+
+
+def test_compact_scenes_from_a_file_an_attribute_and_an_address(require_engine):
+    """Under a policy that lets nothing be fetched but the file."""
+    require_engine("chromium")
+    scene = random_scene(layers=5, seed=2, width=50, height=50)
+    file = written(scene, dict.fromkeys(PRECISIONS, 12))
+    address = sdf2vec.export(scene, "sdf-uri")
+    assert isinstance(address, str)
+    allowed = "default-src 'none'; script-src 'self'; connect-src 'self'; style-src 'unsafe-inline'"
+    policy = f'<meta http-equiv="Content-Security-Policy" content="{allowed}">'
+    elements = [
+        '<sdf-image src="a.sdf"></sdf-image>',
+        f'<sdf-image data="{base64.b64encode(file).decode()}"></sdf-image>',
+        f'<sdf-image src="{address}"></sdf-image>',
+    ]
+    page = policy + GRID + MODULE + "".join(elements)
+    with chromium.opened({"index.html": page, "sdf-image.js": module(), "a.sdf": file}, 400, 80) as shown:
+        sent = sdf2vec.loads(base64.b64decode(address.partition(",")[2]))
+        assert_all_shown(shown, [sdf2vec.loads(file), sdf2vec.loads(file), sent])
 
 
 @pytest.mark.parametrize(("layers", "ground"), [(0, None), (1, (0.8, 0.3, 0.1, 0.4))])
@@ -245,6 +301,34 @@ def test_what_scene_files_may_not_say_is_refused(opened):
         found = page.evaluate(collect, [scene for scene, _ in HOSTILE])
         assert [words in said for words, said in zip(names, found, strict=True)] == [True] * len(names), found
         assert_shows(page, sdf2vec.loads(json.dumps(GOOD)), 100, 100)
+
+
+def test_what_compact_files_may_not_say_is_refused(reading):
+    """As `loads` refuses it; and of random ones nothing is worse than refused."""
+    scene = random_scene(("circle",), layers=2, seed=3, width=50, height=50)
+    good, r = written(scene, dict.fromkeys(PRECISIONS, 9)), random.Random(5)
+    files = [good[:5], good[:-9], good + b"and more", good[:4] + b"\x02" + good[5:], b"{}"]
+    for _ in range(150):
+        changed = bytearray(good)
+        changed[r.randrange(5, len(good))] = r.randrange(256)
+        files.append(bytes(changed))
+    collect = """(files) => {
+      return files.map((data) => { try { window.read(Uint8Array.from(atob(data), (c) => c.charCodeAt(0))); return '' }
+        catch (error) { return error.constructor.name + error.message } });
+    }"""
+    with reading() as page:
+        found = page.evaluate(collect, [base64.b64encode(file).decode() for file in files])
+    for file, said in zip(files, found, strict=True):
+        assert bool(said) == _is_refused(file), (file, said)
+        assert said.startswith("Error") or not said
+
+
+def _is_refused(file):
+    try:
+        sdf2vec.loads(file)
+    except sdf2vec.Sdf2vecError:
+        return True
+    return False
 
 
 @pytest.mark.parametrize(("width", "height"), [(65536, 1), (1, 65536)])

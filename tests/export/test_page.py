@@ -1,7 +1,9 @@
 """The page in a real browser: pixels, resizing, the fallback, copying, comparing."""
 
+import base64
 import json
 import re
+from dataclasses import replace
 from xml.etree import ElementTree
 
 import numpy as np
@@ -10,12 +12,13 @@ import pytest
 import sdf2vec
 from sdf2vec import Layer, Scene, Shape
 from sdf2vec.engines import chromium
-from sdf2vec.export import packing
+from sdf2vec.export import packing, page_texts
 from sdf2vec.export import page as page_module
 from sdf2vec.image import encode_png
 from tests.scenes import random_scene
 
 SCENE = random_scene(("circle", "triangle"), layers=9, seed=4, width=120, height=80)
+TITLE = 'a "quoted" <picture>'
 RECORD_COPIES = "navigator.clipboard.writeText = async (text) => { window.copied = text; }"
 NO_WEBGL = "<script>HTMLCanvasElement.prototype.getContext = () => null;</script>"
 
@@ -26,7 +29,7 @@ def _quick_packing(monkeypatch):
 
 
 def page_of(scene, **options):
-    text = sdf2vec.export(scene, "html", title='a "quoted" <picture>', **options)
+    text = sdf2vec.export(scene, "html", title=TITLE, **options)
     assert isinstance(text, str)
     return text
 
@@ -63,10 +66,10 @@ def assert_shows(page, scene, levels=1.6):
 
 def test_page_shows_the_scene_and_follows_its_size(opened):
     with opened(page_of(SCENE), 400, 500) as page:
-        assert_shows(page, SCENE)
+        assert_shows(page, held(SCENE))
         page.set_viewport_size({"width": 641, "height": 700})
         chromium.wait_until(page, "document.querySelector('canvas').width > 550")
-        assert_shows(page, SCENE)
+        assert_shows(page, held(SCENE))
         assert not page.locator(".fallback").is_visible()
 
 
@@ -114,8 +117,52 @@ def test_buttons_copy_the_texts(opened):
             page.evaluate("document.querySelector('[role=status]').textContent = ''")
 
 
-def _text(name):
-    return sdf2vec.export(SCENE, name, title='a "quoted" <picture>', alone=True)
+def _text(name, scene=SCENE):
+    """What the exporter writes of the scene that the page holds; of a drawing, which it has as it is, of the scene."""
+    if name == "svg":
+        return sdf2vec.export(scene, name, title=TITLE)
+    return sdf2vec.export(held(scene), name, title=TITLE, alone=True, layout="readable")
+
+
+def held(scene):
+    """The scene that a page holds."""
+    (file,) = re.findall(r'readCompact\(Uint8Array.from\(atob\("([^"]+)"', page_of(scene))
+    return sdf2vec.loads(base64.b64decode(file))
+
+
+def test_a_page_holds_the_scene_once_and_hardly_less():
+    found = held(SCENE)
+    off = sdf2vec.render(found, 360) - sdf2vec.render(SCENE, 360)
+    assert 255 * np.abs(off).max() < 0.3
+    script = page_of(SCENE).partition("</svg>")[2]
+    assert (
+        len(page_of(replace(SCENE, layers=SCENE.layers * 3)).partition("</svg>")[2]) < len(script) + 18 * 60
+    )
+
+
+@pytest.mark.parametrize("compositing", ["over", "additive"])
+def test_texts_are_those_of_the_exporter_whatever_is_in_them(compositing, opened, monkeypatch):
+    """All kinds, paints and joins; numbers that make a formula simpler, and whole, tiny and negative ones."""
+    whole = Layer(
+        (Shape.of("box", (1, 0, 1), center=(0, -1), half_size=(1e-6, 2), angle=0, corner_radius=0),), 0.0
+    )
+    scene = random_scene(layers=8, seed=6, compositing=compositing, width=30, height=20)
+    disc = Shape.of("circle", (1, 0, 0), center=(0.1, 0.2), radius=0.3)
+    twice = Layer.union((disc, disc), 0.1, 0.1)  # said once
+    scene = replace(scene, layers=(*scene.layers, whole, replace(whole, opacity=0.0), twice))
+    with opened(page_of(scene), 300, 300) as page:
+        page.evaluate(RECORD_COPIES)
+        for name in ("shadertoy", "glsl", "wgsl"):
+            page.locator(f'[data-text="{name}"]').click()
+            chromium.wait_until(page, "window.copied")
+            assert page.evaluate("window.copied") == _text(name, scene)
+            page.evaluate("window.copied = ''")
+
+
+def test_a_text_too_long_to_be_readable_is_as_exported(monkeypatch):
+    monkeypatch.setattr(page_texts, "TEXT_LIMIT", 1000)
+    texts = json.loads(re.findall(r'id="texts">(.*?)</script>', page_of(SCENE))[0])
+    assert texts["shadertoy"] == sdf2vec.export(held(SCENE), "shadertoy", title=TITLE, alone=True)
 
 
 def _canonical(drawing):
@@ -163,7 +210,7 @@ def test_texts_can_not_end_the_script():
     assert isinstance(page, str)
     texts = re.search(r'id="texts">(.*?)</script>', page, re.DOTALL)
     assert texts
-    assert set(json.loads(texts[1])) == {"fragment", "shadertoy", "glsl", "wgsl"}
+    assert set(json.loads(texts[1])) == {"shadertoy", "glsl", "wgsl"}
     assert "<script>alert" not in page
 
 

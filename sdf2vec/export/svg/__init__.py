@@ -9,13 +9,15 @@ from dataclasses import replace
 from functools import partial
 from urllib.parse import quote
 
+from msgspec import structs
+
 from ...deferred import deferred
 from ...errors import Sdf2vecError
 from ...files import one_line
 from ...grain import Grain, is_drawable
 from ...scene import Scene
 from ..exported import MARK, Exported
-from ..options import EXACT, Accepts, Options
+from ..options import EXACT, FIXED, Accepts, Options
 from .display import Drawing
 from .layers import drawing, drawn
 from .plan import DETAILS, DETAILS_EXACT, Detail, Planner
@@ -104,7 +106,8 @@ def pdf(scene: Scene, options: Options) -> Exported:
 
 def pdf_forms(scene: Scene, options: Options) -> list[Callable[[], Exported]]:
     """The same, and ever coarser drawings."""
-    return [partial(_as_pdf, make) for make in _forms(scene, options, PORTABLE)]
+    sized = structs.replace(options, svg_size=FIXED)  # a page has a size
+    return [partial(_as_pdf, make) for make in _forms(scene, sized, PORTABLE)]
 
 
 def _as_pdf(make: Callable[[], Exported]) -> Exported:
@@ -135,6 +138,7 @@ def _small(grain: Grain) -> Style:
 
 
 def _written(drawing: Drawing, options: Options, style: Style) -> str:
+    style = replace(style, sized=options.svg_size == FIXED)
     return written(drawing, one_line(options.title), style, one_line(options.alt) if options.alt else "")
 
 

@@ -60,14 +60,14 @@ MARGINS = (
     100.0,
     200.0,
     500.0,
-    1000.0,
+    1e3,
 )
 STROKES = {"fill": "currentColor", "stroke": "currentColor", "stroke-width": "0", "stroke-linejoin": "round"}
 
 
 @dataclass(frozen=True)
 class Style:
-    """How a drawing is written. `named`: with the figures' names as ids.
+    """How a drawing is written. `named`: with the figures' names as ids; `sized`: with a width and a height.
 
     `compact`: each figure with as few words as there are. Colour is `currentColor`, said once, the softness a class,
     a polygon's rounding a stroke. One more filter is worth blurring the share `filter` of the canvas' pixels in vain.
@@ -76,6 +76,7 @@ class Style:
     named: bool = True
     compact: bool = False
     filter: float = 0.2
+    sized: bool = False
 
 
 def written(drawing: Drawing, title: str, style: Style, alt: str = "") -> str:
@@ -95,8 +96,9 @@ class _Writer:
         self.drawing = drawing
         self.style = style
         width, height = drawing.width, drawing.height
+        size = (number(width * drawing.scale, 4), number(height * drawing.scale, 4))
         self.svg = svgwrite.Drawing(
-            size=(number(width * drawing.scale, 4), number(height * drawing.scale, 4)),
+            size=size if style.sized else None,
             viewBox=f"0 0 {number(width, 4)} {number(height, 4)}",
             role="img",
             debug=False,

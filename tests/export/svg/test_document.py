@@ -33,10 +33,12 @@ from tests.export.svg.drawings import (
 from tests.scenes import random_scene
 
 
-def test_the_root_says_size_and_role():
-    root = parsed(random_scene(layers=10, width=60, height=40))
+@pytest.mark.parametrize(("asked", "size"), [({}, (None, None)), ({"svg_size": "fixed"}, ("60", "40"))])
+def test_the_root_says_proportions_and_role(asked, size):
+    """A drawing is as large as where it is put, unless a size is asked for."""
+    root = parsed(random_scene(layers=10, width=60, height=40), **asked)
     assert root.tag == f"{NAMESPACE}svg"
-    assert (root.get("width"), root.get("height")) == ("60", "40")
+    assert (root.get("width"), root.get("height")) == size
     assert root.get("viewBox") == "0 0 60 40"
     assert root.get("role") == "img"
 

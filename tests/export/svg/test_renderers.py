@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 from sdf2vec import Layer, Scene
-from sdf2vec.engines import chromium
+from sdf2vec.engines import ENGINES, chromium, svgo
+from sdf2vec.image import premultiply
 from tests.export.svg.drawings import BLURRING, NAMESPACE, decibels, made, off_in, parsed, text_of
 from tests.scenes import SOFT, random_shape
 
@@ -81,6 +82,21 @@ def test_every_renderer_draws_the_same(require_engine, engine, profile, backgrou
         assert abs(off.mean()) < 0.7 / 255, size
 
 
+@pytest.mark.parametrize(
+    "options", [{}, {"svg_profile": "portable"}, {"max_bytes": 6000}], ids=["filters", "portable", "small"]
+)
+def test_svgo_leaves_the_picture_as_it_is(options, require_engine):
+    """With its default options: which names, groups, numbers and definitions it may change is its business."""
+    for engine in ("svgo", "resvg"):
+        require_engine(engine)
+    scene = soft_scene()
+    text = text_of(scene, **options)
+    smaller = svgo.optimized(text)
+    assert len(smaller) < len(text)
+    one, other = (premultiply(ENGINES["resvg"].render(drawing, 300, 200)) for drawing in (text, smaller))
+    assert decibels(one - other) >= 50
+
+
 def test_two_drawings_in_one_page_do_not_disturb_each_other(require_engine):
     """Inline or as <img>, alone, twice, or with another that has the same kinds of definitions: equal pixels.
 
@@ -91,7 +107,7 @@ def test_two_drawings_in_one_page_do_not_disturb_each_other(require_engine):
     image = '<img src="one.svg">'
 
     def second_in(*drawings):
-        style = "<style>*{margin:0}svg,img{display:block}</style>"
+        style = "<style>*{margin:0}svg,img{display:block;width:150px}</style>"
         page = f"<!DOCTYPE html>{style}{''.join(drawings)}"
         with chromium.opened({"index.html": page, "one.svg": one}, 150, 300) as opened:
             return chromium.screenshot(opened)[100:200]

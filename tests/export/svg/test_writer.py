@@ -39,7 +39,7 @@ def last(*items, **options):
 
 def test_the_whole_document():
     plain = Figure(RectangleOutline((50.0, 25.0), (10.0, 5.0), 0.0, 0.0), BLUE, name="box-1")
-    text = text_of(plain)
+    text = text_of(plain, style=Style(sized=True))
     name = re.findall(r'id="(s[0-9a-f]{5})box-1"', text)[0]
     assert text == (
         '<svg height="100" role="img" viewBox="0 0 100 50" width="200" xmlns="http://www.w3.org/2000/svg">\n'
