@@ -29,6 +29,7 @@ from .joining import Search, join
 from .losses import Objective, objective
 from .presets import CROWDING, MSE, Phase, Start
 from .settings import Settings, preset_of
+from .steady import Steady
 from .surroundings import View
 from .weights import weights_for
 
@@ -108,6 +109,7 @@ class Fit:
         self._announce_compiling()
         self.tensors = on_device(self.tensors, self.backend.device)
         self.optimizer = self._adam()
+        self.steady = Steady()
 
     @property
     def phases(self) -> tuple[Phase, ...]:
@@ -132,6 +134,7 @@ class Fit:
         enforce_min_thickness(self.tensors, self.pixel)
         if not self.stopped:
             self._fade()
+        self.steady.say()
 
     def _train_all(self) -> None:
         """All phases and trials."""
@@ -245,9 +248,11 @@ class Fit:
         if phase.growth is None and phase.relocation is None:
             project(self.tensors, self.pixel, self.preset.falloff)  # a start may be out of range
             best = Best(self.tensors)
+        self.steady.begin(self._bare_loss(stage))
         try:
             self._take_steps(stage, moves, best)
         finally:  # also when stopped
+            self._settle(stage)
             if best:
                 best.restore(self._loss(stage))
 
@@ -273,16 +278,20 @@ class Fit:
     ) -> float:
         self.optimizer.zero_grad()
         value = self._value(stage)
+        loss = float(value.detach())
+        if not self.steady.holds(loss, self.tensors, self.optimizer):
+            return self.steady.loss
         if best:
-            best.see(float(value.detach()))
+            best.see(loss)
         value.backward()
+        self.steady.drop_what_is_not_finite(self.optimizer)
         if moves is not None:
             _freeze(self.tensors, moves)
-        self.optimizer.step(rate)
+        self.optimizer.step(rate * self.steady.rate)
         project(self.tensors, self.pixel, self.preset.falloff)
         if self.done % THICKEN_EVERY == 0:
             enforce_min_thickness(self.tensors, self.pixel)
-        return float(value.detach())
+        return loss
 
     def _value(self, stage: Stage) -> torch.Tensor:
         """What is descended."""
@@ -295,6 +304,18 @@ class Fit:
     @torch.no_grad()
     def _loss(self, stage: Stage) -> float:
         return float(self._value(stage))
+
+    @torch.no_grad()
+    def _bare_loss(self, stage: Stage) -> float:
+        """That of the best ground alone."""
+        channels = len(stage.target)
+        ground = mean_color(stage.target, stage.weights)[:channels, None, None]
+        return float(stage.measure(ground.expand_as(stage.target).contiguous()))
+
+    def _settle(self, stage: Stage) -> None:
+        """Before the layers change, or at an end: back to what was good, unless it still is."""
+        self.steady.holds(self._loss(stage), self.tensors, self.optimizer)
+        self.steady.forget()
 
     @torch.no_grad()
     def _fade(self) -> None:
@@ -373,6 +394,7 @@ class Fit:
         count = min(round(share * self.tensors.layer_count), self._replaceable)
         if count == 0:
             return
+        self._settle(stage)
         image = self._draw(self.tensors, stage.target)
         scores = self._scores(image, stage)
         layers = _layers_of(self.settings)
@@ -383,6 +405,7 @@ class Fit:
         """New layers up to this number, and all rates for that."""
         count -= self.tensors.layer_count
         if count > 0:
+            self._settle(stage)
             image = self._draw(self.tensors, stage.target)
             self._add(self.tensors, self.optimizer, image, stage.target, count, stage.weights)
             self.optimizer = self._adam().remembers(self.optimizer)
