@@ -71,15 +71,10 @@ class Steady:
 
     def say(self) -> None:
         """A warning, where anything had to be done."""
-        if self.taken_back:
-            warnings.warn(
-                f"the fit ran away {self.taken_back} times: it went back, with smaller steps",
-                Sdf2vecWarning,
-                stacklevel=2,
-            )
-        if self.dropped:
-            warnings.warn(
-                f"{self.dropped} derivatives of the fit were no numbers and moved nothing",
-                Sdf2vecWarning,
-                stacklevel=2,
-            )
+        said = {
+            "steps of the fit ran away: they were taken back, and those after them are smaller": self.taken_back,
+            "derivatives of the fit were no numbers and moved nothing": self.dropped,
+        }
+        for line, count in said.items():
+            if count:
+                warnings.warn(f"{count} {line}", Sdf2vecWarning, stacklevel=2)
