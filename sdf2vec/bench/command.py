@@ -82,7 +82,7 @@ def command(options: argparse.Namespace, arguments: list[str]) -> int:
         shlex.join(["sdf2vec", "bench", *_without_paths(arguments)]),
     )
     results = compare(plan, _say)
-    write_page(results, methods, options.output)
+    write_page(results, options.output)
     _say(f"{options.output}/index.html: {len(results.runs)} runs")
     return guard.OK
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import tempfile
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -16,7 +16,7 @@ from ..image import Picture, encode_png, load, resize
 from ..outputs import stem_of
 from . import fronts, page
 from .measuring import Source, measured, source_of
-from .methods import Method, described
+from .methods import Method, described, method_of
 from .results import Results, begun, hash_of, keep, machine
 
 COLUMN = 168  # pixels across, of a picture of the figure
@@ -56,7 +56,7 @@ def compare(plan: Plan, say: Callable[[str], None]) -> Results:
     loaded = {name: load(path) for name, path in pictures.items()}
     absent = [method.name for method in plan.methods if method.peer and not _program(plan, method)]
     hashes = {name: hash_of(path) for name, path in pictures.items()}
-    results = begun(plan.folder, Results(machine(), plan.command, hashes, absent, []))
+    results = begun(plan.folder, Results(machine(), [plan.command], hashes, absent, []))
     for name in absent:
         say(f"{name}: not on this machine; --peer NAME=PATH tells where it is")
     tasks = [task for task in _tasks(plan, loaded) if _key(task) not in results.done]
@@ -107,14 +107,15 @@ def _small(pixels: Float32Array) -> Float32Array:
     return resize(pixels, max(1, round(width * scale)), max(1, round(height * scale)))
 
 
-def write_page(results: Results, methods: Sequence[Method], folder: Path) -> None:
+def write_page(results: Results, folder: Path) -> None:
     """Charts, the page, its tables in Markdown, and a figure, of all that there is."""
     runs = results.medians()
     if not runs:
         raise Sdf2vecError("nothing was measured: no run has ended well")
-    list(fronts.write_all(runs, folder))
-    write_atomically(folder / "index.html", page.html(results, described(methods)).encode())
-    write_atomically(folder / "benchmarks.md", page.markdown(results, described(methods), Path()).encode())
+    about = described([method_of(name) for name in results.methods])
+    fronts.write_all(runs, folder)
+    write_atomically(folder / "index.html", page.html(results, about).encode())
+    write_atomically(folder / "benchmarks.md", page.markdown(results, about).encode())
     write_atomically(folder / FIGURE, encode_png(_figure(results, folder)))
 
 

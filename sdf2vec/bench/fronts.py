@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -65,14 +65,13 @@ def files(across: Across, up: str) -> tuple[str, str]:
     return f"{up}-by-{across.name}.png", f"{up}-by-{across.name}.svg"
 
 
-def write_all(runs: Sequence[Run], folder: Path) -> Iterator[tuple[Across, str]]:
-    """Writes every chart, as PNG and as SVG; which there are."""
+def write_all(runs: Sequence[Run], folder: Path) -> None:
+    """Writes every chart, as PNG and as SVG."""
     for across in ACROSS:
         for up in UP:
             chart = drawn(runs, across, up)
             for name in files(across, up):
                 save(chart, folder / name)
-            yield across, up
 
 
 def drawn(runs: Sequence[Run], across: Across, up: str) -> Figure:

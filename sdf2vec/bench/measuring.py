@@ -121,13 +121,26 @@ def took(run: Run, command: list[str]) -> Run:
     with tempfile.TemporaryDirectory() as folder:
         report = Path(folder, "report.json")
         call = [sys.executable, "-I", "-S", launcher.__file__, str(report), str(LIMIT), *command]
-        done = subprocess.run(call, capture_output=True, text=True, errors="replace", check=False)
+        said = _called(call)
         if not report.exists():
-            return replace(run, error=_last_line(done.stderr))
+            return replace(run, error=_last_line(said))
         found = json.loads(report.read_bytes())
     status = found.pop("status")
-    error = "" if status == 0 else f"ended with {status}: {_last_line(done.stderr)}"
+    error = "" if status == 0 else f"ended with {status}: {_last_line(said)}"
     return replace(run, **found, error=error)
+
+
+def _called(command: list[str]) -> str:
+    """What the launcher and its program say on stderr; they end with this process."""
+    pipes = {"stdout": subprocess.DEVNULL, "stderr": subprocess.PIPE}
+    process = subprocess.Popen(command, text=True, errors="replace", **pipes)  # type: ignore[call-overload]
+    try:
+        said: str = process.communicate()[1]
+    except BaseException:
+        process.terminate()
+        process.wait()
+        raise
+    return said
 
 
 def _last_line(text: str) -> str:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Sequence
-from pathlib import Path
 
 from ..templating import template
 from .fronts import ACROSS, UP, Across, files, points
@@ -97,12 +96,12 @@ def _shots(results: Results, name: str) -> Iterator[tuple[str, str]]:
             yield shot(run), f"{run.method} {run.drawn}: {run.psnr:.2f} dB, FLIP {run.flip:.4f}"
 
 
-def markdown(results: Results, about: Sequence[str], charts: Path) -> str:
-    """What `docs/benchmarks.md` holds; `charts`: their folder, as seen from it."""
+def markdown(results: Results, about: Sequence[str]) -> str:
+    """All of it in Markdown; the charts lie beside it."""
     runs = results.medians()
     parts = [
         "# Speed against accuracy",
-        f"    {results.command}",
+        "\n".join(f"    {command}" for command in results.commands),
         f"{results.machine.processor}, {results.machine.cores} cores; "
         + ", ".join(f"{name} {found}" for name, found in results.machine.versions.items())
         + ". Seconds, CPU seconds and memory are those of the whole process, from its start to its SVG; kernels were "
@@ -115,7 +114,7 @@ def markdown(results: Results, about: Sequence[str], charts: Path) -> str:
     for across in ACROSS:
         for up in UP:
             png, _ = files(across, up)
-            parts.append(f"![{UP[up]} by {across.title}]({(charts / png).as_posix()})")
+            parts.append(f"![{UP[up]} by {across.title}]({png})")
     parts.append("## What nothing beats")
     parts.append("\n".join(_front_table(runs)))
     for picture in results.pictures:

@@ -75,10 +75,15 @@ class Results(Struct):
     """All runs, of which pictures (by the hash of their bytes), and which programs were not there."""
 
     machine: Machine
-    command: str
+    commands: list[str]
     pictures: dict[str, str]
     absent: list[str]
     runs: list[Run]
+
+    @property
+    def methods(self) -> list[str]:
+        """The names of all methods that were run."""
+        return list(dict.fromkeys(run.method for run in self.runs))
 
     @property
     def done(self) -> set[tuple[str, str, int, int]]:
@@ -148,7 +153,9 @@ def begun(folder: Path, fresh: Results) -> Results:
     if changed:
         raise Sdf2vecError(f"{path}: {changed[0]} was another picture then; choose another folder")
     found.pictures |= fresh.pictures
-    found.absent, found.command = fresh.absent, fresh.command
+    measured = {run.method for run in found.runs}
+    found.absent = sorted({*found.absent, *fresh.absent} - measured)
+    found.commands += [command for command in fresh.commands if command not in found.commands]
     return found
 
 
