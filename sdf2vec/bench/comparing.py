@@ -5,6 +5,7 @@ from __future__ import annotations
 import tempfile
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
+from itertools import product
 from pathlib import Path
 
 import numpy as np
@@ -77,15 +78,15 @@ def _program(plan: Plan, method: Method) -> str | None:
 
 
 def _tasks(plan: Plan, pictures: dict[str, Picture]) -> Iterator[Task]:
-    for name in pictures:
-        for method in plan.methods:
-            program = _program(plan, method) or ""
-            if method.peer and not program:
-                continue
-            for shapes in plan.shapes if method.counts else (0,):
-                if shapes % method.union == 0:
-                    for seed in range(plan.seeds if method.peer is None else 1):
-                        yield Task(name, method, program, shapes, seed)
+    """Those of all pictures with one method after each other: what is done early compares all of them."""
+    for method in plan.methods:
+        program = _program(plan, method) or ""
+        if method.peer and not program:
+            continue
+        seeds = range(plan.seeds if method.peer is None else 1)
+        counts = [count for count in (plan.shapes if method.counts else (0,)) if count % method.union == 0]
+        for shapes, name, seed in product(counts, pictures, seeds):
+            yield Task(name, method, program, shapes, seed)
 
 
 def _key(task: Task) -> tuple[str, str, int, int]:

@@ -24,8 +24,9 @@ from ..export.byte_limit import gzipped_size
 from ..export.options import Options
 from ..exports import Exports
 from ..flip import flip
-from ..image import Picture, encode_png, premultiply
+from ..image import Picture, encode_png, premultiply, unpremultiply
 from ..metrics import psnr, ssim
+from ..render.draw import draw_fast
 from ..scene import Scene
 from ..scene_file import load as load_scene
 from . import launcher
@@ -153,8 +154,8 @@ def _nothing(source: Source) -> Float32Array:
 
 def _of_scene(run: Run, scene: Scene, svg: str, source: Source) -> tuple[Run, Float32Array]:
     """Scores of the render and of both SVGs; what all exports weigh."""
-    drawn = api.render(scene)
-    straight = drawn if drawn.shape[2] == 4 else np.dstack([drawn, np.ones_like(drawn[..., :1])])
+    image = draw_fast(scene, scene.width, scene.height)
+    straight = unpremultiply(np.ascontiguousarray(image.permute(1, 2, 0).numpy()))
     own = score(straight, source.picture)
     small = str(Exports(scene).smallest("svg", Options()).data)
     near, smaller = (score(_drawn(text, source), source.picture) for text in (svg, small))
