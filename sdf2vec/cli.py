@@ -84,7 +84,7 @@ def _convert_parser() -> argparse.ArgumentParser:
         prog="sdf2vec",
         usage="sdf2vec INPUT... [--emit TARGETS] [-o OUT] [options]",
         description="Fits a few soft geometric shapes to pictures and exports them as mathematics.",
-        epilog="Other commands, each with its own --help: sdf2vec check | render | export | cache | bench | completion. "
+        epilog="Other commands, with their own --help: sdf2vec check | render | export | bench | cache | completion. "
         "--warm-up compiles all that fits may need. --traceback shows where an error that is a bug came from. "
         "Exit status: 0; 2 for what you can mend, 3 where only some pictures failed, 4 where a target was not reached "
         "(the nearest is written), 70 for a bug.",

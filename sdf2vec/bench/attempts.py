@@ -1,11 +1,10 @@
-"""What the catalogue of failures tries, each from a seed: a textbook's way, and ours, on the same picture or numbers."""
+"""What the catalogue tries, each from a seed: a textbook's way, and ours, on the same picture or numbers."""
 
 from __future__ import annotations
 
 import math
 import warnings
 from collections.abc import Callable
-from functools import partial
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -17,24 +16,25 @@ from ..arrays import Float32Array
 from ..blend import JOINS
 from ..engines import resvg
 from ..errors import Sdf2vecWarning
+from ..expr import var
 from ..fit.constraints import thicknesses_of
 from ..fit.losses import LOSSES
 from ..fit.presets import PRESETS
 from ..flip import flip
+from ..graph import components_of
 from ..lower.torch import compile_torch
 from ..metrics import psnr
+from ..operation import VEC2, VEC4
 from ..render import reference
 from ..render.tensors import from_scene
 from ..scene import Joint, Layer, Scene, Shape
 from ..shapes import KINDS
-from ..expr import var
-from ..graph import components_of
-from ..operation import VEC2, VEC4
 from . import hard_pictures as pictures
 from . import textbook
 from .textbook import Discs, anywhere, unguarded
 
 WRONG = math.nan
+FAINT = 0.004  # an opacity
 
 
 class Outcome(NamedTuple):
@@ -94,14 +94,19 @@ def shown(scene: Scene) -> torch.Tensor:
 
 
 def bare_descent(
-    make: Callable[[int], Float32Array], kind: str, shapes: int, least: float, rate: float = 0.01, **options: Any
+    make: Callable[[int], Float32Array],
+    kind: str,
+    shapes: int,
+    least: float,
+    steps: int = textbook.STEPS,
+    **options: Any,
 ) -> Attempt:
     """Theirs: shapes anywhere, descended with nothing that guards them, gain so many dB."""
 
     def attempt(seed: int) -> Outcome:
         target = target_of(make(seed))
         scene = anywhere(target, kind, shapes, seed, **options)
-        return gains(unguarded(scene, target, rate=rate), target, least)
+        return gains(unguarded(scene, target, steps), target, least)
 
     return attempt
 
@@ -122,14 +127,20 @@ def saturated(seed: int, clamped: bool) -> Outcome:
     r = np.random.default_rng(seed)
     rows = [[*r.uniform(-0.4, 0.4, 2), 0.9, *r.uniform(1.2, 2.0, 3)] for _ in range(6)]
     target = target_of(pictures.dark_discs(seed))
-    return gains(Discs(clamped=clamped, added=True).descend(torch.tensor(rows, dtype=torch.float32), target), target, 1.0)
+    return gains(
+        Discs(clamped=clamped, added=True).descend(torch.tensor(rows, dtype=torch.float32), target),
+        target,
+        1.0,
+    )
 
 
 def stacked(seed: int) -> Scene:
     """Seven discs below one that is opaque and hides them."""
     r = np.random.default_rng(seed)
     below = [
-        Layer((Shape.of("circle", tuple(r.random(3)), center=tuple(r.uniform(-0.3, 0.3, 2)), radius=0.1),), 0.05)
+        Layer(
+            (Shape.of("circle", tuple(r.random(3)), center=tuple(r.uniform(-0.3, 0.3, 2)), radius=0.1),), 0.05
+        )
         for _ in range(7)
     ]
     lid = Layer((Shape.of("circle", (0.5, 0.5, 0.5), center=(0.0, 0.0), radius=1.2),), 0.05)
@@ -139,7 +150,9 @@ def stacked(seed: int) -> Scene:
 def alike(seed: int) -> Scene:
     """Eight times the same disc: descent moves all of them alike."""
     r = np.random.default_rng(seed)
-    same = Shape.of("circle", tuple(r.uniform(-0.05, 0.05, 3)), center=tuple(r.uniform(-0.2, 0.2, 2)), radius=0.25)
+    same = Shape.of(
+        "circle", tuple(r.uniform(-0.05, 0.05, 3)), center=tuple(r.uniform(-0.2, 0.2, 2)), radius=0.25
+    )
     ground = tuple(pictures.discs(seed).mean(axis=(0, 1)).tolist())
     return Scene(pictures.SIDE, pictures.SIDE, (Layer((same,), 0.1, 0.9),) * 8, ground, "additive")
 
@@ -151,7 +164,7 @@ def from_start(start: Callable[[int], Scene], least: float, guarded: bool) -> At
         pixels, begin = pictures.discs(seed), start(seed)
         target = target_of(pixels)
         if not guarded:
-            return gains(unguarded(from_scene(begin), target), target, least)
+            return gains(unguarded(from_scene(begin), target, frozen="opacity"), target, least)
         scene = scene_of(pixels, 8, seed, start=begin, kind="circle", preset="balanced")
         return gains(shown(scene), target, least)
 
@@ -163,8 +176,8 @@ def cutter_outside(seed: int) -> Outcome:
     target = target_of(pictures.ring(seed))
     body = Shape.of("circle", (0.2, 0.3, 0.7), center=(0.0, 0.0), radius=0.29)
     cutter = Shape.of("circle", (0.0, 0.0, 0.0), center=(0.75, 0.75), radius=0.1)
-    layer = Layer((body, cutter), 0.02, 1.0, joints=(Layer.joint("subtraction", 0.0),))
-    scene = Scene(pictures.SIDE, pictures.SIDE, (layer,), (0.95, 0.95, 0.9))
+    layer = Layer((body, cutter), 0.02, 1.0, joints=(Joint("subtraction", 0.0),))
+    scene = Scene(96, 96, (layer,), (0.95, 0.95, 0.9))
     return gains(unguarded(from_scene(scene), target), target, 12.0)
 
 
@@ -217,7 +230,7 @@ def our_singular(seed: int) -> Outcome:
     p = var("p", VEC2)
     fields = [kind.distance(p, *kind.variables())]
     found = compile_torch(fields, [*components_of(p), *kind.scalars()])(*inputs, *free)
-    slopes = torch.autograd.grad(sum(f.sum() for f in found), [*inputs, *free], allow_unused=True)
+    slopes = torch.autograd.grad(torch.stack(list(found)).sum(), [*inputs, *free], allow_unused=True)
     return is_no_number([*found, *(slope for slope in slopes if slope is not None)])
 
 
@@ -230,8 +243,8 @@ def flip_slopes(seed: int, smooth: bool) -> Outcome:
     """FLIP's derivative where a picture is out of range or equal to its target: no number, or none at all."""
     target = torch.rand(3, 16, 16, generator=torch.Generator().manual_seed(seed))
     image = {0: target.clone(), 1: target + 1.5, 2: target - 1.5}[seed % 3].requires_grad_()
-    measure = LOSSES["flip"](target) if smooth else partial(flip, reference=target)
-    measure(image).backward()
+    loss = LOSSES["flip"](target)(image) if smooth else flip(image.clamp(0.0, 1.0), target)
+    loss.backward()
     assert image.grad is not None
     is_wrong = seed % 3 != 0  # what is equal may stay
     stuck = is_wrong and float((image.grad != 0).float().mean()) < 0.5
@@ -284,9 +297,9 @@ def paced(seed: int, rate: float, preset: str, guarded: bool, worse: float) -> O
     for factor in (1.0, rate):
         if guarded:
             PRESETS["paced"] = PRESETS[preset].paced(rate=factor)
-            image = shown(scene_of(pixels, 16, seed, preset="paced"))
+            image = shown(scene_of(pixels, 24, seed, preset="paced"))
         else:
-            image = unguarded(anywhere(target, "triangle", 16, seed), target, rate=0.01 * factor)
+            image = unguarded(anywhere(target, "triangle", 24, seed), target, rate=0.01 * factor)
         found.append(float(flip(image, target)) if bool(image.isfinite().all()) else math.inf)
     return Outcome(not found[1] <= worse * found[0], found[1])
 
@@ -295,12 +308,12 @@ def paced(seed: int, rate: float, preset: str, guarded: bool, worse: float) -> O
 
 
 def half_precision(seed: int) -> Outcome:
-    """A disc of 600 pixels in half precision, in pixels."""
+    """A disc of 600 pixels across in half precision, in pixels."""
     r = np.random.default_rng(seed)
     x, y = r.uniform(0.4, 0.6, 2)
-    drawn = textbook.half_cover(x, y, 0.3, 600)
-    at = (torch.arange(600) + 0.5) / 600
-    true = (0.5 - 600 * (torch.hypot(at[None] - x, at[:, None] - y) - 0.3)).clamp(0, 1)
+    drawn = textbook.half_cover(x, y, 0.3, 1000)
+    at = (torch.arange(1000) + 0.5) / 1000
+    true = (0.5 - 1000 * (torch.hypot(at[None] - x, at[:, None] - y) - 0.3)).clamp(0, 1)
     return Outcome(not float(psnr(drawn[None], true[None])) >= 30.0)
 
 
@@ -314,13 +327,13 @@ def declared_precision(seed: int) -> Outcome:
 
 
 def translucent_stack(seed: int) -> Outcome:
-    """300 layers of an opacity of 1/100, rounded to 8 bits after each, against what they come to."""
+    """300 layers of an opacity of 1/250, rounded to 8 bits after each, against what they come to."""
     generator = torch.Generator().manual_seed(seed)
     covers = torch.rand(300, 24, 24, generator=generator)
     colors, exact = torch.rand(300, generator=generator), torch.zeros(24, 24)
     for cover, color in zip(covers, colors, strict=True):
-        exact = exact + (color - exact) * cover * 0.01
-    drawn = textbook.eight_bits_at_a_time(covers, colors, 0.01)
+        exact = exact + (color - exact) * cover * FAINT
+    drawn = textbook.eight_bits_at_a_time(covers, colors, FAINT)
     return Outcome(not float(psnr(drawn[None], exact[None])) >= 35.0)
 
 

@@ -38,8 +38,12 @@ def add_choices(parser: argparse.ArgumentParser) -> None:
         "fast:sharp, thesis:ssim:box:union4."
     )
     parser.add_argument("pictures", nargs="*", metavar="PICTURE")
-    parser.add_argument("-o", "--output", type=Path, metavar="DIR", help="where results, charts and the page go")
-    parser.add_argument("--shapes", default="64,256", metavar="N,N", help="numbers of shapes (default: 64,256)")
+    parser.add_argument(
+        "-o", "--output", type=Path, metavar="DIR", help="where results, charts and the page go"
+    )
+    parser.add_argument(
+        "--shapes", default="64,256", metavar="N,N", help="numbers of shapes (default: 64,256)"
+    )
     parser.add_argument(
         "--methods", default=",".join(USUAL), help=f"methods and groups of them (default: {','.join(USUAL)})"
     )
@@ -49,7 +53,9 @@ def add_choices(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument("--stability", action="store_true", help="run the catalogue of where methods fail")
     parser.add_argument("--seeds", type=int, default=20, metavar="N", help="of the catalogue (default: 20)")
-    parser.add_argument("--cases", default="", metavar="NAMES", help="only these of the catalogue")
+    parser.add_argument(
+        "--cases", default="", metavar="NAMES", help="only these of the catalogue, separated by semicolons"
+    )
     parser.add_argument(
         "--baseline",
         metavar="FILE",
@@ -90,7 +96,9 @@ def command(options: argparse.Namespace, arguments: list[str]) -> int:
 def _without_paths(arguments: list[str]) -> list[str]:
     """The command as it is told to others: files by their names alone."""
     return [
-        f"{name}={Path(path).name}" if name in ("primitive", "geometrize", "vtracer", "sqip") else Path(word).name
+        f"{name}={Path(path).name}"
+        if name in ("primitive", "geometrize", "vtracer", "sqip")
+        else Path(word).name
         for word in arguments
         for name, _, path in [word.partition("=")]
     ]

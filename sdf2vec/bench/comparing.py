@@ -124,7 +124,11 @@ def _figure(results: Results, folder: Path) -> Float32Array:
     """A column a picture; below it what each method made with most shapes."""
     columns = []
     for name in results.pictures:
-        largest = {run.method: run for run in sorted(results.medians(), key=lambda r: r.shapes) if run.picture == name}
+        largest = {
+            run.method: run
+            for run in sorted(results.medians(), key=lambda r: r.shapes)
+            if run.picture == name
+        }
         names = [page.original(name), *(page.shot(run) for run in largest.values())]
         images = [load(str(folder / path)).pixels[..., :3] for path in names]
         height = round(COLUMN * images[0].shape[0] / images[0].shape[1])

@@ -1,4 +1,4 @@
-"""The charts of a benchmark: FLIP and PSNR against seconds, bytes and numbers, a panel a picture, each with its front."""
+"""The charts of a benchmark: FLIP and PSNR by seconds, bytes, numbers; a panel a picture, each with its front."""
 
 from __future__ import annotations
 

@@ -8,24 +8,28 @@ from PIL import Image, ImageDraw
 from ..arrays import Float32Array
 
 SIDE = 40
+Color = tuple[float, ...] | np.ndarray  # or a picture, or a point
 
 
-def _grid(width: int = SIDE, height: int = SIDE) -> tuple[Float32Array, Float32Array]:
-    y, x = np.mgrid[:height, :width].astype(np.float32) + 0.5
+def _grid(side: int = SIDE) -> tuple[Float32Array, Float32Array]:
+    at: Float32Array = np.arange(side, dtype=np.float32) + np.float32(0.5)
+    x, y = np.meshgrid(at, at)
     return x, y
 
 
-def disc(x: float, y: float, radius: float, color: object, ground: object, side: int = SIDE) -> Float32Array:
-    """An antialiased disc; in pixels."""
-    across, down = _grid(side, side)
-    cover = np.clip(radius + 0.5 - np.hypot(across - x, down - y), 0.0, 1.0)[..., None]
-    return (np.asarray(ground) + (np.asarray(color) - np.asarray(ground)) * cover).astype(np.float32)
+def disc(center: Color, radius: float, color: Color, ground: Color, side: int = SIDE) -> Float32Array:
+    """An antialiased disc, laid on a colour or a picture; in pixels."""
+    across, down = _grid(side)
+    cover = np.clip(radius + 0.5 - np.hypot(across - center[0], down - center[1]), 0.0, 1.0)[..., None]
+    below, own = (np.asarray(part, np.float32) for part in (ground, color))
+    made: Float32Array = (below + (own - below) * cover).astype(np.float32)
+    return made
 
 
 def one_disc(seed: int) -> Float32Array:
     """A light disc on the right of a dark ground."""
     r = np.random.default_rng(seed)
-    return disc(r.uniform(26, 32), r.uniform(10, 30), r.uniform(4, 7), (0.9, 0.8, 0.3), (0.1, 0.1, 0.2))
+    return disc((r.uniform(26, 32), r.uniform(10, 30)), r.uniform(4, 7), (0.9, 0.8, 0.3), (0.1, 0.1, 0.2))
 
 
 def discs(seed: int, count: int = 6) -> Float32Array:
@@ -33,26 +37,28 @@ def discs(seed: int, count: int = 6) -> Float32Array:
     r = np.random.default_rng(seed)
     picture = np.full((SIDE, SIDE, 3), r.uniform(0.2, 0.8, 3), np.float32)
     for _ in range(count):
-        picture = disc(*r.uniform(4, SIDE - 4, 2), r.uniform(3, 9), r.random(3), picture)
+        picture = disc(r.uniform(4, SIDE - 4, 2), r.uniform(3, 9), r.random(3), picture)
     return picture
 
 
 def dark_discs(seed: int) -> Float32Array:
     """The same, all dark: what is too bright has to be taken away."""
-    return discs(seed) * np.float32(0.3)
+    dark: Float32Array = discs(seed) * np.float32(0.3)
+    return dark
 
 
 def faint(seed: int) -> Float32Array:
     """A disc of four levels on grey."""
     r = np.random.default_rng(seed)
-    picture = disc(*r.uniform(12, 28, 2), r.uniform(6, 10), (0.5 + 4 / 255,) * 3, (0.5,) * 3)
-    return np.round(picture * 255).astype(np.float32) / 255
+    picture = disc(r.uniform(12, 28, 2), r.uniform(6, 10), (0.5 + 4 / 255,) * 3, (0.5,) * 3)
+    levels: Float32Array = np.round(picture * 255).astype(np.float32) / np.float32(255)
+    return levels
 
 
 def far(seed: int) -> Float32Array:
     """A small disc in a corner of a plain ground."""
     r = np.random.default_rng(seed)
-    return disc(*r.uniform(3, 6, 2), 2.5, (0.9, 0.2, 0.1), (0.85, 0.85, 0.9), 64)
+    return disc(r.uniform(3, 6, 2), 2.5, (0.9, 0.2, 0.1), (0.85, 0.85, 0.9), 64)
 
 
 def lettering(seed: int) -> Float32Array:
@@ -93,11 +99,12 @@ def tiny(seed: int) -> Float32Array:
 
 
 def ring(seed: int) -> Float32Array:
-    """A disc with a round hole, off its centre."""
+    """A disc with a round hole, off its centre; 96 pixels a side, on which it is plainly drawn."""
     r = np.random.default_rng(seed)
-    x, y, radius = *r.uniform(17, 23, 2), r.uniform(10, 13)
-    whole = disc(x, y, radius, (0.2, 0.3, 0.7), (0.95, 0.95, 0.9))
-    return disc(x + r.uniform(-3, 3), y + r.uniform(-3, 3), radius * 0.45, (0.95, 0.95, 0.9), whole)
+    center, radius = r.uniform(40, 56, 2), r.uniform(24, 32)
+    blue, paper = (0.2, 0.3, 0.7), (0.95, 0.95, 0.9)
+    whole = disc(center, radius, blue, np.full((96, 96, 3), paper, np.float32), 96)
+    return disc(center + r.uniform(-7, 7, 2), radius * 0.45, paper, whole, 96)
 
 
 def noise(seed: int) -> Float32Array:
@@ -109,8 +116,11 @@ def scene_like(seed: int) -> Float32Array:
     """Soft hills of colour, edges, some texture: as a photograph has them."""
     r = np.random.default_rng(seed)
     x, y = _grid()
-    hills = [0.5 + 0.4 * np.sin(x * r.uniform(0.02, 0.2) + y * r.uniform(-0.2, 0.2) + 6 * r.random()) for _ in "rgb"]
+    hills = [
+        0.5 + 0.4 * np.sin(x * r.uniform(0.02, 0.2) + y * r.uniform(-0.2, 0.2) + 6 * r.random())
+        for _ in "rgb"
+    ]
     picture = np.stack(hills, axis=2).astype(np.float32)
     for _ in range(4):
-        picture = disc(*r.uniform(0, SIDE, 2), r.uniform(4, 12), r.random(3), picture)
+        picture = disc(r.uniform(0, SIDE, 2), r.uniform(4, 12), r.random(3), picture)
     return np.clip(picture + r.normal(0, 0.02, picture.shape), 0, 1).astype(np.float32)

@@ -75,7 +75,9 @@ def source_of(name: str, picture: Picture, folder: Path) -> Source:
     return Source(name, picture, str(path))
 
 
-def measured(source: Source, method: Method, program: str, shapes: int, seed: int) -> tuple[Run, Float32Array]:
+def measured(
+    source: Source, method: Method, program: str, shapes: int, seed: int
+) -> tuple[Run, Float32Array]:
     """One run, and what it made as pixels [H, W, 4], straight. A program that fails gives a run with its error."""
     run = Run(source.name, method.name, method.family, shapes, seed)
     with tempfile.TemporaryDirectory() as folder:
@@ -107,7 +109,9 @@ def _warmed(name: str, union: int) -> None:
         path = Path(folder, "ramp.png")
         path.write_bytes(encode_png(rows))
         files = (path, Path(folder, "scene.json"), Path(folder, "drawing.svg"))
-        done = subprocess.run(worker(*files, 16 * union, 0, name), capture_output=True, text=True, check=False)
+        done = subprocess.run(
+            worker(*files, 16 * union, 0, name), capture_output=True, text=True, check=False
+        )
         if done.returncode:
             raise Sdf2vecError(f"{name}: {_last_line(done.stderr)}")
 

@@ -32,9 +32,15 @@ COLUMNS = {
     "shader": ("shader_bytes", ",d"),
     "gzip  ": ("shader_gzip", ",d"),
 }
-IN_MARKDOWN = ("method", "shapes", "PSNR dB", "SSIM", "FLIP", "seconds", "CPU seconds", "MiB", "numbers")
-IN_MARKDOWN += ("gzip", "its dB", "gzip ", "its dB ", "gzip  ")
-HEADS = {"gzip": "SVG gz", "its dB": "dB of it", "gzip ": "smallest SVG gz", "its dB ": "dB of it", "gzip  ": "shader gz"}
+LEFT_OUT = ("picture", "SVG", "smallest SVG", "shader")  # of the tables in Markdown
+IN_MARKDOWN = tuple(name for name in COLUMNS if name not in LEFT_OUT)
+HEADS = {
+    "gzip": "SVG gz",
+    "its dB": "dB of it",
+    "gzip ": "smallest SVG gz",
+    "its dB ": "dB of it",
+    "gzip  ": "shader gz",
+}
 
 
 def fronts_of(runs: Sequence[Run], across: Across, up: str) -> Iterator[tuple[str, list[str]]]:
@@ -104,8 +110,8 @@ def markdown(results: Results, about: Sequence[str]) -> str:
         "\n".join(f"    {command}" for command in results.commands),
         f"{results.machine.processor}, {results.machine.cores} cores; "
         + ", ".join(f"{name} {found}" for name, found in results.machine.versions.items())
-        + ". Seconds, CPU seconds and memory are those of the whole process, from its start to its SVG; kernels were "
-        "compiled before. Scored by the same code at the picture's own size: the render, or another program's SVG drawn "
+        + ". Seconds, CPU seconds and memory are those of the whole process, from its start to its SVG; kernels "
+        "were compiled before. Scored by the same code at the picture's own size: the render, or another program's SVG drawn "
         "by resvg. `dB of it`: the SVG before it, as resvg draws it.",
     ]
     if results.absent:

@@ -6,10 +6,16 @@ Figures of programs that are not on the machine are those that were published or
 from __future__ import annotations
 
 import json
+import os
 import re
 import shutil
-from collections.abc import Callable, Mapping
+import subprocess
+import sys
+import tempfile
+from collections.abc import Callable
 from dataclasses import dataclass
+from importlib.util import find_spec
+from pathlib import Path
 from typing import NamedTuple
 
 from ..errors import Sdf2vecError
@@ -44,7 +50,8 @@ class Published(NamedTuple):
 class Peer:
     """A program: `programs` are the names it is found by; `command` calls it such that it writes an SVG.
 
-    `counts`: whether it is told a number of shapes. `mend`: what its SVG needs before a renderer takes it.
+    `counts`: whether it is told a number of shapes. `mend`: what its SVG needs before a renderer takes it. `package`:
+    of Python, which does instead of a program.
     """
 
     about: str
@@ -52,9 +59,12 @@ class Peer:
     command: Callable[[Call], list[str]]
     counts: bool = True
     mend: Callable[[str, Call], str] = lambda svg, call: svg
+    package: str = ""
 
-    def found(self, given: str | None) -> str | None:
-        """Where the program is: as given, or as the system finds it."""
+    def found(self, given: str | None = None) -> str | None:
+        """Where the program is: as given, this Python where it has the package, or as the system finds it."""
+        if not given and self.package and find_spec(self.package):
+            return sys.executable
         names = (given,) if given else self.programs
         return next(filter(None, map(shutil.which, names)), None)
 
@@ -82,7 +92,9 @@ def _sqip(call: Call) -> list[str]:
     return [call.program, "-n", str(call.shapes), "-o", call.target, call.source]
 
 
-VTRACER = "import json, sys, vtracer as v; v.convert_image_to_svg_py(*sys.argv[1:3], **json.loads(sys.argv[3]))"
+VTRACER = (
+    "import json, sys, vtracer as v; v.convert_image_to_svg_py(*sys.argv[1:3], **json.loads(sys.argv[3]))"
+)
 
 
 def _vtracer(**options: int | str) -> Callable[[Call], list[str]]:
@@ -105,7 +117,7 @@ def _namespaced(svg: str, call: Call) -> str:
     return re.sub(r'xmlns="[^"]*"', f'xmlns="{SVG}"', svg, count=1)
 
 
-FRUGAL = {
+FRUGAL: dict[str, int | str] = {
     "mode": "polygon",
     "color_precision": 8,
     "filter_speckle": 16,
@@ -116,25 +128,53 @@ FRUGAL = {
 PEERS: dict[str, Peer] = {
     "primitive": Peer("fogleman/primitive, triangles", ("primitive",), _primitive(1)),
     "primitive-ellipse": Peer("fogleman/primitive, rotated ellipses", ("primitive",), _primitive(7)),
-    "geometrize": Peer(
-        "geometrizejs-cli, rotated ellipses", ("geometrize",), _geometrize, mend=_namespaced
+    "geometrize": Peer("geometrizejs-cli, rotated ellipses", ("geometrize",), _geometrize, mend=_namespaced),
+    "vtracer": Peer(
+        "vtracer at its defaults, paths", ("vtracer",), _vtracer(), counts=False, package="vtracer"
     ),
-    "vtracer": Peer("vtracer at its defaults, paths", ("vtracer",), _vtracer(), counts=False),
     "vtracer-frugal": Peer(
-        "vtracer with large polygons, paths", ("vtracer",), _vtracer(**FRUGAL), counts=False
+        "vtracer with large polygons, paths",
+        ("vtracer",),
+        _vtracer(**FRUGAL),
+        counts=False,
+        package="vtracer",
     ),
     "sqip": Peer("sqip, blurred triangles", ("sqip",), _sqip),
 }
 
 
-def programs_of(given: list[str]) -> Mapping[str, str]:
+def drawn_by(name: str, png: bytes) -> tuple[str, float]:
+    """The SVG that a program which is told no number makes of a picture, and its CPU seconds.
+
+    Raises Sdf2vecError where it is missing or fails.
+    """
+    peer = PEERS[name]
+    program = peer.found()
+    if program is None:
+        raise Sdf2vecError(f"{name} is not here: pip install {peer.package}, or put its program on the path")
+    with tempfile.TemporaryDirectory() as folder:
+        source, target = Path(folder, "picture.png"), Path(folder, "picture.svg")
+        source.write_bytes(png)
+        call = Call(program, str(source), str(target), (0, 0), 0)
+        before = os.times()
+        done = subprocess.run(peer.command(call), capture_output=True, text=True, check=False)
+        after = os.times()
+        if done.returncode or not target.exists():
+            raise Sdf2vecError(f"{name} failed: {done.stderr or done.stdout}")
+        spent = sum(after[2:4]) - sum(before[2:4])  # of children
+        return peer.mend(target.read_text(encoding="utf-8"), call), spent
+
+
+def programs_of(given: list[str]) -> dict[str, str]:
     """From NAME=PATH; a name stands for all peers that call that program. Raises Sdf2vecError for an unknown one."""
     names = {program for peer in PEERS.values() for program in peer.programs}
     found = {}
     for text in given:
         name, _, path = text.partition("=")
         if name not in names or not path:
-            raise Sdf2vecError(f"a program is told as NAME=PATH, NAME of {', '.join(sorted(names))}: {text!r}")
+            raise Sdf2vecError(
+                f"a program is told as NAME=PATH, NAME of {', '.join(sorted(names))}: {text!r}"
+            )
         if shutil.which(path) is None:
             raise Sdf2vecError(f"{path} is no program; give the path of {name}")
         found[name] = path
@@ -160,7 +200,13 @@ PUBLISHED = (
     Published(_GEOMETRIZE, "peppers", 256, 7.0, 21.64, 0.297, 5204, MEASURED),
     Published("sqip, blurred", "woman_darkhair", 8, 12.7, 15.9, 0.397, 447, MEASURED),
     Published("thesis, triangles, MSE", "woman_darkhair", 64, None, None, 0.1912, None, "its table 5.1, GPU"),
-    Published("thesis, triangles, SSIM", "woman_darkhair", 64, None, None, 0.1721, None, "its table 5.1, GPU"),
-    Published("thesis, triangles, MSE", "woman_darkhair", 256, None, None, 0.1679, None, "its table 5.1, GPU"),
-    Published("thesis, triangles, SSIM", "woman_darkhair", 256, None, None, 0.1380, None, "its table 5.1, GPU"),
+    Published(
+        "thesis, triangles, SSIM", "woman_darkhair", 64, None, None, 0.1721, None, "its table 5.1, GPU"
+    ),
+    Published(
+        "thesis, triangles, MSE", "woman_darkhair", 256, None, None, 0.1679, None, "its table 5.1, GPU"
+    ),
+    Published(
+        "thesis, triangles, SSIM", "woman_darkhair", 256, None, None, 0.1380, None, "its table 5.1, GPU"
+    ),
 )

@@ -1,4 +1,4 @@
-"""What a benchmark has measured so far: kept in one file, written anew after each run, so that it can be gone on with."""
+"""What a benchmark has measured so far: in one file, written anew after each run, so that it can be gone on with."""
 
 from __future__ import annotations
 
@@ -36,8 +36,8 @@ class Machine(Struct, frozen=True):
 class Run(Struct, frozen=True, omit_defaults=True):
     """One picture through one method, scored at the picture's own size.
 
-    `seconds`, `cpu`, `megabytes`: of the whole process, from its start to its SVG. `psnr`, `ssim`, `flip`: of the scene's
-    render, of another program's SVG by resvg. `svg_…`: the SVG as resvg draws it; `small_…`: its smallest form.
+    `seconds`, `cpu`, `megabytes`: of the whole process, from its start to its SVG. `psnr`, `ssim`, `flip`: of the
+    scene's render, of another program's SVG by resvg. `svg_…`: the SVG as resvg draws it; `small_…`: its smallest form.
     """
 
     picture: str
@@ -148,7 +148,9 @@ def begun(folder: Path, fresh: Results) -> Results:
     except (OSError, msgspec.MsgspecError) as error:
         raise Sdf2vecError(f"{path}: no results of a benchmark ({error}); choose another folder") from error
     if found.machine != fresh.machine:
-        raise Sdf2vecError(f"{path}: measured on another machine or with other versions; choose another folder")
+        raise Sdf2vecError(
+            f"{path}: measured on another machine or with other versions; choose another folder"
+        )
     changed = [name for name, known in fresh.pictures.items() if found.pictures.get(name, known) != known]
     if changed:
         raise Sdf2vecError(f"{path}: {changed[0]} was another picture then; choose another folder")

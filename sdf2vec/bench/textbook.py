@@ -1,7 +1,7 @@
-"""What textbooks say and where it fails: a dense reference whose options are the methods that the catalogue shows failing.
+"""What textbooks say and where it fails: a dense reference whose options are the methods that the catalogue shows.
 
-Discs under `over` or added up, with every pixel of every shape, and plain torch; and any scene of this program, descended
-by the reference renderer with nothing that guards it.
+Discs under `over` or added up, every pixel of every shape in plain torch; and any scene of this program, descended by
+the reference renderer with nothing that guards it.
 """
 
 from __future__ import annotations
@@ -59,17 +59,21 @@ class Discs:
 
 
 def unguarded(
-    scene: SceneTensors, target: torch.Tensor, steps: int = STEPS, rate: float = 0.01, decay: bool = True
+    scene: SceneTensors, target: torch.Tensor, steps: int = STEPS, rate: float = 0.01, frozen: str = ""
 ) -> torch.Tensor:
-    """The render [3, H, W] of a scene descended by Adam in plain torch: every number free, at one rate; in place."""
-    free = [scene.background, *(t for group in scene.groups for t in group.values.values())]
+    """The render [3, H, W] of a scene descended by Adam in plain torch: every number at one rate; in place.
+
+    `frozen`: the name of a parameter that stays.
+    """
+    named = [(slot.parameter.name, t) for group in scene.groups for slot, t in group.values.items()]
+    free = [scene.background, *(tensor for name, tensor in named if name != frozen)]
     for tensor in free:
         tensor.requires_grad_()
     adam = torch.optim.Adam(free, lr=rate)
     height, width = target.shape[1:]
     for step in range(steps):
         for choice in adam.param_groups:
-            choice["lr"] = rate * (0.5 + 0.5 * math.cos(math.pi * step / steps) if decay else 1.0)
+            choice["lr"] = rate * (0.5 + 0.5 * math.cos(math.pi * step / steps))
         adam.zero_grad()
         (reference.composite(scene, width, height)[:3] - target).square().mean().backward()
         adam.step()

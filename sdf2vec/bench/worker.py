@@ -1,11 +1,12 @@
 """One fit in a process of its own, as the command line does it: a picture is read, fitted, and its SVG written.
 
-    python -m sdf2vec.bench.worker PICTURE SCENE SVG SHAPES SEED METHOD
+python -m sdf2vec.bench.worker PICTURE SCENE SVG SHAPES SEED METHOD
 """
 
 from __future__ import annotations
 
 import sys
+from typing import Any
 
 from .. import api
 from ..files import write_atomically
@@ -22,7 +23,8 @@ def main() -> None:
     method = method_of(name)
     assert method.pace is not None
     PRESETS[PACED] = PRESETS[method.pace.preset].paced(method.pace.steps)
-    scene = api.fit(picture, int(shapes), seed=int(seed), preset=PACED, **(method.options or {}))  # type: ignore[arg-type,misc]
+    options: dict[str, Any] = {"preset": PACED, **(method.options or {})}
+    scene = api.fit(picture, int(shapes), seed=int(seed), **options)
     write_atomically(scene_path, dumps(scene).encode())
     write_atomically(svg_path, api.exported(scene, "svg").raw)
 

@@ -23,7 +23,7 @@ from .backends import Backend, choose
 from .best import Best, faded, mean_color, nearest_of_its_own
 from .constraints import enforce_min_thickness, project, too_small
 from .growth import densify, exchange, importance, prune, relocate
-from .initialization import Layers, background_of, empty_groups, place
+from .initialization import Layers, background_of, empty_groups, place, tell_apart
 from .joining import RESOLUTIONS as JOIN_RESOLUTIONS
 from .joining import Search, join
 from .losses import Objective, objective
@@ -179,6 +179,7 @@ class Fit:
         present = {group.structure for group in tensors.groups}
         tensors.groups += [group for group in empty_groups(layers) if group.structure not in present]
         self._resize(tensors, target)
+        tell_apart(tensors, self.generator)
         return tensors
 
     def _resize(self, tensors: SceneTensors, target: torch.Tensor) -> None:
