@@ -29,7 +29,7 @@ from .joining import Search, join
 from .losses import Objective, objective
 from .presets import CROWDING, MSE, Phase, Start
 from .settings import Settings, preset_of
-from .steady import Steady
+from .steady import HARDLY_SEEN, MATTERS, Steady
 from .surroundings import View
 from .weights import weights_for
 
@@ -249,7 +249,7 @@ class Fit:
         if phase.growth is None and phase.relocation is None:
             project(self.tensors, self.pixel, self.preset.falloff)  # a start may be out of range
             best = Best(self.tensors)
-        self.steady.begin(self._bare_loss(stage))
+        self.steady.begin(self._small_loss(stage))
         try:
             self._take_steps(stage, moves, best)
         finally:  # also when stopped
@@ -307,11 +307,11 @@ class Fit:
         return float(self._value(stage))
 
     @torch.no_grad()
-    def _bare_loss(self, stage: Stage) -> float:
-        """That of the best ground alone."""
-        channels = len(stage.target)
-        ground = mean_color(stage.target, stage.weights)[:channels, None, None]
-        return float(stage.measure(ground.expand_as(stage.target).contiguous()))
+    def _small_loss(self, stage: Stage) -> float:
+        """What may rise and fall: a share of what the best ground alone has, or an error that is hardly seen."""
+        ground = mean_color(stage.target, stage.weights)[: len(stage.target), None, None]
+        bare = stage.measure(ground.expand_as(stage.target).contiguous())
+        return max(MATTERS * float(bare), float(stage.measure(stage.target + HARDLY_SEEN)))
 
     def _settle(self, stage: Stage) -> None:
         """Before the layers change, or at an end: back to what was good, unless it still is."""

@@ -12,9 +12,11 @@ from ..render.tensors import SceneTensors
 from .adam import Adam
 
 KEEP_EVERY = 10  # steps
-RUNS_AWAY = 1.3  # times the least loss kept; at the presets' rates, 1.1 was the most seen
+RUNS_AWAY = 1.5  # times the least loss kept; at the presets' rates, 1.1 was the most seen
 MATTERS = 0.1  # of a bare ground's loss: what is below it may rise and fall
+HARDLY_SEEN = 0.03  # of white, by which all pixels are off: what is below that loss may, too
 SLOWER = 0.5
+SAID = 4  # steps taken back that are worth a word: the first with few shapes often is
 
 
 class Steady:
@@ -22,11 +24,12 @@ class Steady:
 
     def __init__(self) -> None:
         self.rate, self.taken_back, self.dropped = 1.0, 0, 0
-        self.begin(math.inf)
+        self.begin(0.0)
 
-    def begin(self, bare: float) -> None:
-        """A stretch with a loss of its own, of which a bare ground has so much."""
-        self.bare = bare
+    def begin(self, small: float) -> None:
+        """A stretch with a loss of its own: up to so much it may rise and fall."""
+        self.small = small
+        self.rate = min(1.0, self.rate / SLOWER)
         self.forget()
 
     def forget(self) -> None:
@@ -47,7 +50,7 @@ class Steady:
     def _is_fine(self, loss: float) -> bool:
         if not math.isfinite(loss):
             return not self.kept
-        return loss <= max(RUNS_AWAY * self.loss, MATTERS * self.bare)
+        return loss <= max(RUNS_AWAY * self.loss, self.small)
 
     def _keep(self, loss: float, scene: SceneTensors) -> None:
         tensors = [scene.background, *(t for group in scene.groups for t in group.values.values())]
@@ -70,11 +73,13 @@ class Steady:
                 self.dropped += 1
 
     def say(self) -> None:
-        """A warning, where anything had to be done."""
-        said = {
-            "steps of the fit ran away: they were taken back, and those after them are smaller": self.taken_back,
-            "derivatives of the fit were no numbers and moved nothing": self.dropped,
-        }
-        for line, count in said.items():
-            if count:
-                warnings.warn(f"{count} {line}", Sdf2vecWarning, stacklevel=2)
+        """A warning, where much had to be done."""
+        said = []
+        if self.taken_back >= SAID:
+            said.append(
+                f"{self.taken_back} steps of the fit ran away: they were taken back, and smaller ones taken"
+            )
+        if self.dropped:
+            said.append(f"{self.dropped} derivatives of the fit were no numbers and moved nothing")
+        for line in said:
+            warnings.warn(line, Sdf2vecWarning, stacklevel=2)

@@ -22,10 +22,10 @@ RED_DISC = Layer((Shape.of("circle", (1.0, 0.0, 0.0), center=(0, 0), radius=0.3)
 SCENE = Scene(8, 8, (RED_DISC,), (0.5, 0.5, 0.5))
 
 
-def watched(bare=1.0):
+def watched(small=0.0):
     tensors = from_scene(SCENE)
     steady = Steady()
-    steady.begin(bare)
+    steady.begin(small)
     return steady, tensors, adam_over(tensors)
 
 
@@ -50,7 +50,7 @@ def test_what_is_no_number_runs_away(loss):
 
 
 def test_small_losses_may_rise():
-    steady, tensors, adam = watched(bare=1.0)
+    steady, tensors, adam = watched(small=0.1)
     assert steady.holds(1e-4, tensors, adam)
     assert steady.holds(0.09, tensors, adam)
     assert steady.taken_back == 0
