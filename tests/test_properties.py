@@ -1,5 +1,7 @@
 """Whatever scene is valid: it renders finite, is read as written, and a shader of it draws the same."""
 
+from typing import Any
+
 import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
@@ -16,7 +18,12 @@ SCENES = st.builds(
     longest=st.integers(1, 2),
     compositing=st.sampled_from(["over", "additive"]),
 )
-KEPT = {"deadline": None, "derandomize": True, "database": None, "suppress_health_check": list(HealthCheck)}
+KEPT: dict[str, Any] = {
+    "deadline": None,
+    "derandomize": True,
+    "database": None,
+    "suppress_health_check": list(HealthCheck),
+}
 
 
 @settings(max_examples=25, **KEPT)

@@ -24,6 +24,7 @@ GREY = '<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 48 32"><rect width=
 
 def test_methods_are_paces_changed_by_words():
     method = method_of("thesis:ssim:box:union4")
+    assert method.pace
     assert (method.family, method.pace.preset, method.union) == ("thesis", "thesis", 4)
     assert method.options == {"compositing": "additive", "loss": "ssim", "kind": "box", "union": 4}
     assert method_of("fast").options == {"kind": "triangle"}
@@ -108,7 +109,8 @@ def _engines(require_engine):
 
 
 def test_runs_are_not_done_twice(results):
-    methods, said = tuple(methods_of("draft,primitive")), []
+    methods = tuple(methods_of("draft,primitive"))
+    said: list[str] = []
     programs = {"primitive": str(results / "primitive")}
     again = Plan(
         (str(results / "disc.png"),), methods, (5,), 1, programs, results / "out", "sdf2vec bench again"

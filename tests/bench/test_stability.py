@@ -33,7 +33,8 @@ def test_textbooks_fail(name):
 
 
 def test_the_catalogue_is_gone_on_with(tmp_path):
-    name, said = "smooth minimum, large d/k", []
+    name = "smooth minimum, large d/k"
+    said: list[str] = []
     assert not stability.run(tmp_path, 2, name, said.append)
     kept = json.loads((tmp_path / stability.KEPT).read_text())
     kept["ours"][name]["failed"][0] = True  # as if it had
