@@ -103,14 +103,16 @@ def _begun(path: Path) -> Catalogue:
 
 def page(cases: Sequence[Case], found: Catalogue) -> str:
     """All of it in Markdown."""
-    failing = [case.name for case in cases if any(found.ours[case.name].failed)]
-    said = f"Ours fails at: {', '.join(failing)}." if failing else "Ours fails at none."
+    failing = [case for case in cases if any(found.ours[case.name].failed)]
+    named = [f"{case.name} ({case.left or 'not understood yet'})" for case in failing]
+    said = f"Ours fails at: {'; '.join(named)}." if failing else "Ours fails at none."
+    seeds = max(len(tried.failed) for tried in found.ours.values())
     versions = ", ".join(f"{name} {version}" for name, version in found.machine.versions.items())
     return (
         "\n\n".join(
             (
                 "# Where such methods fail",
-                "    sdf2vec bench --stability -o DIR",
+                f"    sdf2vec bench --stability --seeds {seeds} -o DIR",
                 "Each entry is a small picture, scene or set of numbers made from a seed; `theirs` is a textbook's way "
                 "(`sdf2vec/bench/textbook.py`), `ours` this program. FLIP: the median over the seeds, and from the "
                 f"least to the greatest. {versions}.",
