@@ -14,7 +14,7 @@ NEAR, FACTOR_TEN = 1.1, 1.5  # times the FLIP at the default rate
 
 @dataclass(frozen=True)
 class Case:
-    """An entry of the catalogue. `seeds`: how many the tests try; 0 where one takes seconds. `left`: why ours may fail."""
+    """An entry. `seeds`: how many the tests try, 0 where one takes seconds; `left`: why ours may fail."""
 
     name: str
     why: str
@@ -175,8 +175,8 @@ CASES: tuple[Case, ...] = (
         partial(attempts.paced, rate=3.0, preset="balanced", guarded=False, worse=NEAR),
         partial(attempts.paced, rate=3.0, preset="balanced", guarded=True, worse=NEAR),
         0,
-        "a single fit of 24 shapes to 40 pixels; of 48 triangles on two photographs at 128 pixels FLIP was 3% and 2% up "
-        "at three times the rates, 2% down and 5% up at a third",
+        "a single fit of 24 shapes to 40 pixels; of 48 triangles on two photographs at 128 pixels FLIP was 3% and 2% "
+        "up at three times the rates, 2% down and 5% up at a third",
     ),
     Case(
         "rates a third as high",

@@ -8,6 +8,7 @@ from pathlib import Path
 
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
 
 from .chart import save
 from .pareto import Point, front
@@ -97,6 +98,9 @@ def drawn(runs: Sequence[Run], across: Across, up: str) -> Figure:
 def _fill(panel: Axes, found: Sequence[Point], up: str) -> None:
     """All points, and the front with names."""
     panel.set_xscale("log")
+    panel.xaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
+    panel.xaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:,g}"))
+    panel.xaxis.set_minor_formatter(NullFormatter())
     panel.grid(alpha=0.25, which="both")
     for family in COLORS:
         own = [point for point in found if point.family == family]
