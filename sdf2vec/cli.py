@@ -15,6 +15,7 @@ from msgspec.structs import replace
 
 from . import __version__, cached, completing, guard, warming
 from .batch import READ_TOO, Batch, about, about_left, check_streams, exit_status, run_batch
+from .bench import command as benching
 from .checkpoint import OFF
 from .converting import Work, write_exports
 from .declared import add_flags, checked, chosen, options_of
@@ -83,7 +84,7 @@ def _convert_parser() -> argparse.ArgumentParser:
         prog="sdf2vec",
         usage="sdf2vec INPUT... [--emit TARGETS] [-o OUT] [options]",
         description="Fits a few soft geometric shapes to pictures and exports them as mathematics.",
-        epilog="Other commands, each with its own --help: sdf2vec check | render | export | cache | completion. "
+        epilog="Other commands, with their own --help: sdf2vec check | render | export | bench | cache | completion. "
         "--warm-up compiles all that fits may need. --traceback shows where an error that is a bug came from. "
         "Exit status: 0; 2 for what you can mend, 3 where only some pictures failed, 4 where a target was not reached "
         "(the nearest is written), 70 for a bug.",
@@ -289,6 +290,16 @@ def _cache_command(arguments: list[str]) -> int:
     return cached.command(_cache_parser().parse_args(arguments))
 
 
+def _bench_parser() -> argparse.ArgumentParser:
+    parser = _Parser(prog="sdf2vec bench", description=benching.ABOUT)
+    benching.add_choices(parser)
+    return parser
+
+
+def _bench_command(arguments: list[str]) -> int:
+    return benching.command(_bench_parser().parse_intermixed_args(arguments), arguments)
+
+
 def _warm_up_command(arguments: list[str]) -> int:
     about = "Compiles the kernels of every kind of shape, so that no fit has to: half a minute, once."
     return warming.command(_Parser(prog="sdf2vec --warm-up", description=about), arguments)
@@ -310,6 +321,7 @@ def _completion_command(arguments: list[str]) -> int:
         "render": _render_parser(),
         "export": _export_parser(),
         "cache": _cache_parser(),
+        "bench": _bench_parser(),
         "completion": _completion_parser(),
     }
     print(completing.script(_completion_parser().parse_args(arguments).shell, parsers), end="")
@@ -369,6 +381,7 @@ COMMANDS: dict[str, Callable[[list[str]], int]] = {
     "render": _render_command,
     "export": _export_command,
     "cache": _cache_command,
+    "bench": _bench_command,
     "completion": _completion_command,
     WARM_UP: _warm_up_command,
 }

@@ -1,4 +1,4 @@
-"""Line charts for the documentation, as SVG."""
+"""Line charts for the documentation, and charts of any kind as files."""
 
 from __future__ import annotations
 
@@ -17,14 +17,13 @@ Points = Sequence[tuple[float, float]]
 
 @dataclass(frozen=True)
 class Chart:
-    """What a chart shows; both axes are logarithmic unless said otherwise. Dashed: names of lines to dash."""
+    """What a chart shows; both axes are logarithmic. Dashed: names of lines to dash."""
 
     title: str
     across: str
     up: str
     lines: Mapping[str, Points]
     dashed: tuple[str, ...] = ()
-    straight: bool = False  # a linear axis upwards
 
 
 def write(chart: Chart, path: Path) -> None:
@@ -34,15 +33,20 @@ def write(chart: Chart, path: Path) -> None:
     for name, points in chart.lines.items():
         style = "--" if name in chart.dashed else "-"
         axes.plot(*zip(*points, strict=True), style, marker="o", markersize=4, label=name)
-    axes.set(title=chart.title, xlabel=chart.across, ylabel=chart.up, xscale="log")
-    axes.set_yscale("linear" if chart.straight else "log")
+    axes.set(title=chart.title, xlabel=chart.across, ylabel=chart.up, xscale="log", yscale="log")
     ticks = sorted({x for points in chart.lines.values() for x, _ in points})
     if len(ticks) <= 8:
         axes.set_xticks(ticks, [f"{tick:g}" for tick in ticks])
         axes.minorticks_off()
     axes.grid(alpha=0.3)
     axes.legend(fontsize=8)
-    file = io.BytesIO()
+    save(figure, path)
+
+
+def save(figure: Figure, path: Path) -> None:
+    """Writes a figure as what its name's ending says; the same figure gives the same file."""
+    file, form = io.BytesIO(), path.suffix[1:]
+    metadata = {"Date": None, "Creator": None} if form == "svg" else {"Software": None}
     with mpl.rc_context({"svg.hashsalt": "sdf2vec", "svg.fonttype": "none"}):
-        figure.savefig(file, format="svg", metadata={"Date": None, "Creator": None})
+        figure.savefig(file, format=form, metadata=metadata, dpi=110)
     write_atomically(path, file.getvalue())

@@ -25,7 +25,7 @@ from ..export.byte_limit import gzipped_size
 from ..files import write_atomically
 from ..image import encode_png, premultiply
 from ..scene import Scene
-from . import vtracer
+from .peers import PEERS, drawn_by
 from .recovery import psnr
 from .svg_shapes import count_numbers, parsed, shapes_of
 
@@ -121,9 +121,8 @@ def _traced(
     svg: str, picture: Float32Array, shapes: int | str, options: dict[str, Any]
 ) -> tuple[Drawing, Float32Array]:
     """vtracer's at its defaults."""
-    started = time.process_time()
-    text = vtracer.traced(encode_png(picture))
-    return measured(text, picture, elements(text), time.process_time() - started)
+    text, seconds = drawn_by("vtracer", encode_png(picture))
+    return measured(text, picture, elements(text), seconds)
 
 
 def _own(
@@ -239,7 +238,7 @@ def main() -> None:
     parser.add_argument("--hands", default=",".join(HANDS), help="whose drawings are compared")
     parser.add_argument("-o", "--output", type=Path, required=True)
     options = parser.parse_args()
-    hands = [hand for hand in options.hands.split(",") if hand != "vtracer" or vtracer.is_there()]
+    hands = [hand for hand in options.hands.split(",") if hand != "vtracer" or PEERS["vtracer"].found()]
     given = {name: value for name, value in vars(options).items() if name in GIVEN and value is not None}
     shapes = "auto" if options.shapes == "auto" else int(options.shapes)
     shown: Path = options.output.with_suffix(".png")

@@ -21,9 +21,9 @@ from ..arrays import Float32Array
 from ..errors import Sdf2vecError
 from ..files import write_atomically
 from ..image import Picture, encode_png
-from . import vtracer
 from .known_drawing import KnownScene
 from .known_scenes import COUNTS, MODES, SIDE, known_scene
+from .peers import drawn_by
 from .recovery import ENOUGH, Answer, Verdict, f1, judged, scene_answer, svg_answer
 
 SEEDS = 20
@@ -80,9 +80,8 @@ def by_fit(case: Case, known: KnownScene, options: argparse.Namespace) -> Answer
 
 def by_vtracer(case: Case, known: KnownScene, options: argparse.Namespace) -> Answer:
     """vtracer at its defaults."""
-    started = time.process_time()
-    svg = vtracer.traced(encode_png(known.pixels))
-    return svg_answer(svg, known.side, time.process_time() - started)
+    svg, seconds = drawn_by("vtracer", encode_png(known.pixels))
+    return svg_answer(svg, known.side, seconds)
 
 
 def by_file(case: Case, known: KnownScene, options: argparse.Namespace) -> Answer:

@@ -76,6 +76,13 @@ class Adam:
         for moving in self.moving:
             moving.step(factor)
 
+    @torch.no_grad()
+    def forget(self) -> None:
+        """As before the first step."""
+        for moving in self.moving:
+            for memory in (moving.mean, moving.square, moving.steps):
+                memory.zero_()
+
     def remembers(self, before: Adam) -> Adam:
         """Itself, with what another remembers of the same tensors."""
         old = {id(moving.tensor): moving for moving in before.moving}

@@ -30,7 +30,7 @@ class Best:
     @torch.no_grad()
     def restore(self, loss: float) -> None:
         """Goes back to it, in place, unless now, with this loss, the scene is as good."""
-        if self.least < loss:
+        if not loss <= self.least:  # what is no number is not
             for tensor, best in zip(self.tensors, self.state, strict=True):
                 tensor.copy_(best)
 

@@ -68,6 +68,15 @@ def areas_of(group: Group) -> list[torch.Tensor]:
     return [_measures(part.kind)(*group.shape(index))[0] for index, part in enumerate(group.structure)]
 
 
+def thicknesses_of(tensors: SceneTensors) -> list[torch.Tensor]:
+    """The least widths of a scene's shapes, one [G] for each part of each group, in scene units."""
+    return [
+        _measures(part.kind)(*group.shape(index))[1]
+        for group in tensors.groups
+        for index, part in enumerate(group.structure)
+    ]
+
+
 @cache
 def _measures(kind: str) -> Callable[..., Tensors]:
     """Area and thickness of a shape from its numbers."""

@@ -22,6 +22,7 @@ LARGEST_SIZE = 0.35  # size of a shape, for a canvas of area 1
 START_OPACITY = 0.8  # of an opaque picture, where colours are not signed
 HOLES = 0.02  # share of a picture that may have less alpha than its ground
 FAINTEST_GROUND = 1 / 255  # of alpha
+APART = 0.02  # by which equal layers are moved, in units of each number
 START_SMOOTHNESS = 0.25  # of a smooth union, of the size of its layer
 
 
@@ -112,6 +113,17 @@ def empty_groups(layers: Layers) -> list[Group]:
     """A group without layers for each kind."""
     nowhere = Places(torch.zeros(0, 2), torch.zeros(0), torch.zeros(0, 4))
     return groups_at(nowhere, layers, torch.Generator())
+
+
+@torch.no_grad()
+def tell_apart(tensors: SceneTensors, generator: torch.Generator) -> None:
+    """Moves layers that are the same as another a little, in place: added up, descent would move all of them alike."""
+    for group in tensors.groups:
+        same = group.rows().unique(dim=0, return_inverse=True)[1] if len(group) > 1 else group.order
+        twice = [index for index, which in enumerate(same.tolist()) if which in same[:index]]
+        for tensor in group.values.values():
+            moves = torch.randn(len(twice), tensor.shape[1], generator=generator) * APART
+            tensor[twice] += moves.to(tensor)
 
 
 def detail(target: torch.Tensor) -> torch.Tensor:

@@ -23,12 +23,13 @@ from .backends import Backend, choose
 from .best import Best, faded, mean_color, nearest_of_its_own
 from .constraints import enforce_min_thickness, project, too_small
 from .growth import densify, exchange, importance, prune, relocate
-from .initialization import Layers, background_of, empty_groups, place
+from .initialization import Layers, background_of, empty_groups, place, tell_apart
 from .joining import RESOLUTIONS as JOIN_RESOLUTIONS
 from .joining import Search, join
 from .losses import Objective, objective
 from .presets import CROWDING, MSE, Phase, Start
 from .settings import Settings, preset_of
+from .steady import HARDLY_SEEN, MATTERS, Steady
 from .surroundings import View
 from .weights import weights_for
 
@@ -108,6 +109,7 @@ class Fit:
         self._announce_compiling()
         self.tensors = on_device(self.tensors, self.backend.device)
         self.optimizer = self._adam()
+        self.steady = Steady()
 
     @property
     def phases(self) -> tuple[Phase, ...]:
@@ -132,6 +134,7 @@ class Fit:
         enforce_min_thickness(self.tensors, self.pixel)
         if not self.stopped:
             self._fade()
+        self.steady.say()
 
     def _train_all(self) -> None:
         """All phases and trials."""
@@ -176,6 +179,7 @@ class Fit:
         present = {group.structure for group in tensors.groups}
         tensors.groups += [group for group in empty_groups(layers) if group.structure not in present]
         self._resize(tensors, target)
+        tell_apart(tensors, self.generator)
         return tensors
 
     def _resize(self, tensors: SceneTensors, target: torch.Tensor) -> None:
@@ -245,9 +249,11 @@ class Fit:
         if phase.growth is None and phase.relocation is None:
             project(self.tensors, self.pixel, self.preset.falloff)  # a start may be out of range
             best = Best(self.tensors)
+        self.steady.begin(self._small_loss(stage))
         try:
             self._take_steps(stage, moves, best)
         finally:  # also when stopped
+            self._settle(stage)
             if best:
                 best.restore(self._loss(stage))
 
@@ -273,16 +279,20 @@ class Fit:
     ) -> float:
         self.optimizer.zero_grad()
         value = self._value(stage)
+        loss = float(value.detach())
+        if not self.steady.holds(loss, self.tensors, self.optimizer):
+            return self.steady.loss
         if best:
-            best.see(float(value.detach()))
+            best.see(loss)
         value.backward()
+        self.steady.drop_what_is_not_finite(self.optimizer)
         if moves is not None:
             _freeze(self.tensors, moves)
-        self.optimizer.step(rate)
+        self.optimizer.step(rate * self.steady.rate)
         project(self.tensors, self.pixel, self.preset.falloff)
         if self.done % THICKEN_EVERY == 0:
             enforce_min_thickness(self.tensors, self.pixel)
-        return float(value.detach())
+        return loss
 
     def _value(self, stage: Stage) -> torch.Tensor:
         """What is descended."""
@@ -295,6 +305,18 @@ class Fit:
     @torch.no_grad()
     def _loss(self, stage: Stage) -> float:
         return float(self._value(stage))
+
+    @torch.no_grad()
+    def _small_loss(self, stage: Stage) -> float:
+        """What may rise and fall: a share of what the best ground alone has, or an error that is hardly seen."""
+        ground = mean_color(stage.target, stage.weights)[: len(stage.target), None, None]
+        bare = stage.measure(ground.expand_as(stage.target).contiguous())
+        return max(MATTERS * float(bare), float(stage.measure(stage.target + HARDLY_SEEN)))
+
+    def _settle(self, stage: Stage) -> None:
+        """Before the layers change, or at an end: back to what was good, unless it still is."""
+        self.steady.holds(self._loss(stage), self.tensors, self.optimizer)
+        self.steady.forget()
 
     @torch.no_grad()
     def _fade(self) -> None:
@@ -373,6 +395,7 @@ class Fit:
         count = min(round(share * self.tensors.layer_count), self._replaceable)
         if count == 0:
             return
+        self._settle(stage)
         image = self._draw(self.tensors, stage.target)
         scores = self._scores(image, stage)
         layers = _layers_of(self.settings)
@@ -383,6 +406,7 @@ class Fit:
         """New layers up to this number, and all rates for that."""
         count -= self.tensors.layer_count
         if count > 0:
+            self._settle(stage)
             image = self._draw(self.tensors, stage.target)
             self._add(self.tensors, self.optimizer, image, stage.target, count, stage.weights)
             self.optimizer = self._adam().remembers(self.optimizer)

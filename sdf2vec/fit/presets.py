@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Literal
 
 Loss = tuple[tuple[str, float], ...]  # name in `losses.LOSSES`, weight
@@ -119,6 +119,16 @@ class Preset:
     def steps(self) -> int:
         """Steps of all phases."""
         return sum(phase.total for phase in self.phases)
+
+    def paced(self, steps: float = 1.0, rate: float = 1.0) -> Preset:
+        """The same with so many times the steps, at so many times the rates."""
+
+        def phase(of: Phase) -> Phase:
+            count = max(1, round(of.steps * steps))
+            growth = of.growth and replace(of.growth, every=max(1, round(of.growth.every * steps)))
+            return replace(of, steps=count, rate=of.rate * rate, end_rate=of.end_rate * rate, growth=growth)
+
+        return replace(self, phases=tuple(map(phase, self.phases)))
 
 
 L1_MSE: Loss = (("l1", 1.0), ("mse", 10.0))

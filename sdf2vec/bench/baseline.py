@@ -1,0 +1,112 @@
+"""Whether fits have become worse: five small pictures made by code, every kind, `fast`, against figures kept before."""
+
+from __future__ import annotations
+
+import warnings
+from collections.abc import Callable, Mapping
+from pathlib import Path
+
+import msgspec
+import numpy as np
+
+from .. import api
+from ..arrays import Float32Array
+from ..errors import Sdf2vecError, Sdf2vecWarning
+from ..files import write_atomically
+from ..image import load
+from ..quality import psnr_of
+from ..shapes import KINDS
+from . import hard_pictures as pictures
+from .speed import picture, scene, seconds, step
+
+SHAPES = 8
+DROP = 0.3  # dB
+SLOWER = 1.5
+COUNT, SIDE = 64, 64  # shapes and pixels of the step whose time is taken
+
+PICTURES: Mapping[str, Callable[[int], Float32Array]] = {
+    "discs": pictures.discs,
+    "hills": pictures.scene_like,
+    "ring": pictures.ring,
+    "letters": pictures.lettering,
+    "strip": lambda seed: np.ascontiguousarray(pictures.strip(2 * seed + 1)[:, ::12]),
+}
+
+
+def decibels(kind: str) -> float:
+    """The mean PSNR of fits of one kind to two of the pictures, which all kinds together share evenly."""
+    found, makes, place = [], list(PICTURES.values()), list(KINDS).index(kind)
+    for step_on in (0, 2):
+        pixels = makes[(place + step_on) % len(makes)](1)
+        options = {"kind": kind, "compositing": "additive"} if KINDS[kind].patch else {"kind": kind}
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", Sdf2vecWarning)
+            found_scene = api.fit(pixels, SHAPES, preset="fast", seed=0, **options)  # type: ignore[arg-type]
+        found.append(psnr_of(found_scene, load(pixels)))
+    return float(np.mean(found))
+
+
+def times_faster(kind: str) -> float:
+    """A dense step against one of ours, measured side by side."""
+    target = picture(SIDE)
+    slow, fast = (
+        seconds(step(scene((kind,), COUNT, target), target, dense), least=0.2) for dense in (True, False)
+    )
+    return slow / fast
+
+
+class Figures(msgspec.Struct):
+    """What is kept: of each kind its dB, and how many times faster than a dense step one of ours is."""
+
+    decibels: dict[str, float]
+    times_faster: dict[str, float]
+
+
+def measured() -> Figures:
+    """Now."""
+    return Figures(
+        {kind: round(decibels(kind), 2) for kind in KINDS},
+        {kind: round(times_faster(kind), 1) for kind in KINDS},
+    )
+
+
+def kept(path: Path) -> Figures:
+    """Before. Raises Sdf2vecError for a file that is none."""
+    try:
+        return msgspec.json.decode(path.read_bytes(), type=Figures)
+    except (OSError, msgspec.MsgspecError) as error:
+        raise Sdf2vecError(f"{path}: no baseline ({error}); remove it, and it is made anew") from error
+
+
+def worse(before: Figures, now: Figures) -> list[str]:
+    """A line for each kind that has lost dB or speed."""
+    lines = [
+        f"{kind}: {now.decibels[kind]:.2f} dB, {was:.2f} before"
+        for kind, was in before.decibels.items()
+        if not now.decibels.get(kind, -np.inf) >= was - DROP
+    ]
+    lines += [
+        f"{kind}: a step is {now.times_faster[kind]:.0f} times faster than a dense one, {was:.0f} before"
+        for kind, was in before.times_faster.items()
+        if now.times_faster.get(kind, 0.0) < was / SLOWER
+    ]
+    return lines
+
+
+def check(path: Path, say: Callable[[str], None]) -> bool:
+    """Compares with what a file holds, or writes it; whether anything is worse."""
+    now = measured()
+    if not path.exists():
+        write_atomically(path, msgspec.json.format(msgspec.json.encode(now), indent=1) + b"\n")
+        say(f"{path}: written")
+        return False
+    before = kept(path)
+    for kind, value in now.decibels.items():
+        say(
+            f"{kind}: {value:.2f} dB ({before.decibels.get(kind, float('nan')):.2f}), "
+            f"{now.times_faster[kind]:.0f} times faster than dense ({before.times_faster.get(kind, float('nan')):.0f})"
+        )
+    lines = worse(before, now)
+    for line in lines:
+        say(f"worse: {line}")
+    return bool(lines)
