@@ -8,6 +8,8 @@ from dataclasses import replace
 from functools import cached_property, partial
 from typing import TYPE_CHECKING
 
+from msgspec import structs
+
 from .declared import check_choice
 from .deferred import deferred
 from .export import EXPORTERS, Exporter
@@ -22,7 +24,10 @@ if TYPE_CHECKING:
     from .image import Picture
 
 FEW = 32  # sharp layers, of which plain elements with names are small enough
-HARDLY = 0.2  # dB that a small drawing may lose of the picture
+HARDLY, LITTLE = (
+    0.2,
+    0.5,
+)  # dB that a small drawing may lose of the picture; where none loses less, the finest
 ABOUT = 1.03  # of a size limit, that a drawing which is still to be fitted may seem to take
 
 _drawable: Callable[[Scene, Callable[[float], View], Grain], Scene] = deferred(
@@ -74,6 +79,9 @@ class Exports:
 
     def _made(self, exporter: Exporter, scene: Scene, options: Options) -> Exported:
         """The finest that keeps to the size limit; where none does, the smallest."""
+        if exporter.holds_drawing:
+            small = self._near_enough(EXPORTERS["svg"], scene, Options(title=options.title, alt=options.alt))
+            options = structs.replace(options, drawing=str(small.data) if small else "")
         if options.max_bytes is None:
             return self._near_enough(exporter, scene, options) or exporter.from_finest(scene, options)[0]()
         limit, tried = ByteLimit.of(options.max_bytes), []
@@ -99,7 +107,7 @@ class Exports:
             made = exporter.draw(drawn, options, grain)
             wrong = 10 ** (-_psnr_of(drawn, picture) / 10) + (made.error / 255) ** 2
             lost = near + 10 * math.log10(max(wrong, 1e-12))
-            if lost <= HARDLY:
+            if lost <= (LITTLE if grain is USUAL[-1] else HARDLY):
                 return replace(
                     made, notes=(f"{exporter.suffix[1:]}: drawn small, {_lost(lost)}", *made.notes)
                 )

@@ -67,4 +67,5 @@ class ExportKeywords(TypedDict, total=False):
     alt: str
     alone: bool
     near: float | None
+    drawing: str
     original: bytes | None

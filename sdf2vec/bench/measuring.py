@@ -36,6 +36,7 @@ from .results import Run
 from .svg_shapes import count_numbers, parsed, shapes_of
 
 LIMIT = 1800.0  # seconds of one run
+SMALLEST = Options(max_bytes=1)  # of a drawing, which no limit keeps from its smallest form
 SMALL = 48  # pixels of the picture that compiles a method's kernels
 
 
@@ -161,7 +162,7 @@ def _of_scene(run: Run, scene: Scene, svg: str, source: Source) -> tuple[Run, Fl
     image = draw_fast(scene, scene.width, scene.height)
     straight = unpremultiply(np.ascontiguousarray(image.permute(1, 2, 0).numpy()))
     own = score(straight, source.picture)
-    small = str(Exports(scene).smallest("svg", Options()).data)
+    small = str(Exports(scene, source.picture).export("svg", SMALLEST).data)
     near, smaller = (score(_drawn(text, source), source.picture) for text in (svg, small))
     shader = api.exported(scene, "shadertoy").raw
     figures = {

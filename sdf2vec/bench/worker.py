@@ -26,7 +26,7 @@ def main() -> None:
     options: dict[str, Any] = {"preset": PACED, **(method.options or {})}
     scene = api.fit(picture, int(shapes), seed=int(seed), **options)
     write_atomically(scene_path, dumps(scene).encode())
-    write_atomically(svg_path, api.exported(scene, "svg").raw)
+    write_atomically(svg_path, api.exported(scene, "svg", picture=picture).raw)
 
 
 if __name__ == "__main__":

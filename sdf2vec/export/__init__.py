@@ -23,7 +23,8 @@ class Exporter:
     `accepts` says which scenes `write` takes, `most_shapes` how many shapes they may have; `heeds` names the options
     that matter to it; other files that it may write end in `beside`. `forms(scene, options)`, where there are several,
     begin with that of `write` and take ever fewer bytes; each is made when it is called. Where it `draws` a scene,
-    `draw` makes a small drawing of one whose numbers a grain can say (`fit.drawable`). A file that ends in one of
+    `draw` makes a small drawing of one whose numbers a grain can say (`fit.drawable`).
+    `holds_drawing`: an SVG is in it. A file that ends in one of
     `endings` is taken to be for it; one that holds `mark` was made by it. `is_text`: it writes text, not bytes;
     `is_picture`: the render.
     """
@@ -39,6 +40,7 @@ class Exporter:
     forms: Callable[[Scene, Options], Sequence[Callable[[], Exported]]] | None = None
     draws: Callable[[Scene, Options], bool] = lambda scene, options: False
     draw: Callable[[Scene, Options, Grain], Exported] | None = None
+    holds_drawing: bool = False
     is_text: bool = True
     is_picture: bool = False
     most_shapes: Callable[[Options], int] = lambda options: MAX_SHAPES
@@ -164,6 +166,7 @@ EXPORTERS: dict[str, Exporter] = {
         heeds=("max_bytes", "title", "alt", "original"),
         other_endings=(".htm",),
         mark=b'<meta name="generator" content="sdf2vec">',
+        holds_drawing=True,
     ),
     "component": Exporter(
         ".sdf-image.js",

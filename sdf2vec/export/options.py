@@ -53,7 +53,7 @@ class Options(Struct, frozen=True, kw_only=True):
         str,
         choice(
             "SVG fidelity",
-            "to the picture: small, and at most 0.2 dB lost; to the render; exact: without blurs",
+            "to the picture: small, hardly any of it lost; to the render; exact: without blurs",
             SVG_FIDELITIES,
         ),
     ] = PICTURE
@@ -76,6 +76,7 @@ class Options(Struct, frozen=True, kw_only=True):
     alt: Annotated[str, plain("what is in the picture, for who can't see an SVG or a page", "TEXT")] = ""
     alone: Annotated[bool, plain("no files beside the text")] = False
     near: Annotated[float | None, plain("dB that the scene is from the picture it was fitted to")] = None
+    drawing: Annotated[str, plain("small SVG of the scene, in place of a page's own")] = ""
     original: Annotated[bytes | None, plain("PNG, JPEG or WebP that a page compares with")] = None
 
 

@@ -46,7 +46,7 @@ def html(scene: Scene, options: Options) -> Exported:
     plain = Options(title=options.title, alt=options.alt)
     alone = replace(plain, alone=True)
     served = [name for name in LABELS if name != "svg" and scene.shape_count <= most_shapes(alone, name)]
-    drawing, file = _drawing(scene, plain), fine(scene, _aim(scene.shape_count))
+    drawing, file = _inline(options.drawing) or _drawing(scene, plain), fine(scene, _aim(scene.shape_count))
     held = read(file)
     texts = PageTexts.of(held, served, alone)
     text = template("page.html.jinja").render(
@@ -99,10 +99,14 @@ def _drawing(scene: Scene, options: Options) -> str:
     if scene.shape_count > TEXT_SHAPES:
         return ""
     try:
-        drawing = str(svg(scene, options).data)
+        return _inline(str(svg(scene, options).data))
     except Sdf2vecError:
         return ""
-    return drawing[drawing.index("<svg") :].strip()
+
+
+def _inline(drawing: str) -> str:
+    """An SVG as part of a page."""
+    return drawing[drawing.find("<svg") :].strip()
 
 
 def _image(scene: Scene, options: Options) -> str:
