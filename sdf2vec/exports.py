@@ -118,7 +118,12 @@ class Exports:
     ) -> Iterator[Callable[[], Exported]]:
         """What may keep to a size limit."""
         draw = exporter.draw if exporter.draw and exporter.draws(scene, options) else None
-        if draw is None or options.svg_fidelity != PICTURE:
+        near = None
+        if draw and limit.share(draw(_rounded(scene, USUAL[0]), options, USUAL[0]).raw) <= ABOUT:
+            near = self._near_enough(exporter, scene, options)
+        if near:
+            yield lambda: near
+        else:
             yield from exporter.from_finest(scene, options)
         if draw is None:
             return

@@ -28,7 +28,7 @@ def of_kinds(**size):
     layers = [
         layer
         for seed, kind in enumerate(KINDS)
-        for layer in random_scene((kind,), layers=4, seed=seed).layers
+        for layer in random_scene((kind,), layers=4, seed=seed, paints=("flat",), joins=()).layers
     ]
     return Scene(layers=tuple(layers), background=(0.5, 0.5, 0.5), **size)
 

@@ -26,7 +26,7 @@ from .writer import Style, written
 PORTABLE, INKSCAPE = "portable", "inkscape"
 IN_QUOTES = "!$'()*+,;=:@/?"  # what a URI takes as it is, but for "&", which HTML does not
 ACCEPTED = ("over",)
-SMALLER = "svg: drawn small (coordinates on a grid, few softnesses)"
+SMALLER = "svg: drawn in the smallest form (coarse coordinates, colours, blurs)"
 CREATED = re.compile(rb"(/CreationDate \(D:)([^)]*)")
 PRODUCER = re.compile(rb"(?<=/Producer \()(cairo [\d.]+) \(https?://cairographics\.org\)(?=\))")
 

@@ -7,6 +7,7 @@ import pytest
 from sdf2vec import Layer, Scene, Shape
 from sdf2vec.export.svg.plan import DETAILS, Planner
 
+ELLIPSE = Shape.of("ellipse", (1, 0, 0), center=(0, 0), radii=(0.3, 0.2), angle=0)
 DISC = Shape.of("circle", (1, 1, 1), center=(0, 0), radius=0.3)
 BOX = Shape.of("box", (0.25, 0.25, 0.25), center=(0, 0), half_size=(0.3, 0.1), angle=0.5, corner_radius=0.0)
 PATCH = Shape.of("gaussian", (1, 0, 0), center=(0, 0), radii=(0.2, 0.1), angle=0.0)
@@ -46,7 +47,9 @@ def test_coarser_details_have_no_more_stops_and_bands():
 
 
 def test_only_what_can_be_blurred_has_a_smallest_drawing():
-    assert planner(Layer((DISC,), 0.2)).details == list(DETAILS)
-    assert planner(Layer((DISC,), 0.2), filters=False).details == planner(Layer((PATCH,), 0.0)).details
+    """But for shapes whose small drawing is fitted."""
+    assert planner(Layer((ELLIPSE,), 0.2)).details == list(DETAILS)
+    assert planner(Layer((DISC,), 0.2)).details == planner(Layer((PATCH,), 0.0)).details
+    assert planner(Layer((ELLIPSE,), 0.2), filters=False).details == planner(Layer((PATCH,), 0.0)).details
     assert not any(detail.grain for detail in planner(Layer((PATCH,), 0.0)).details)
-    assert planner(Layer((DISC,), 0.0), filters=False).details == list(DETAILS)
+    assert planner(Layer((ELLIPSE,), 0.0), filters=False).details == list(DETAILS)
