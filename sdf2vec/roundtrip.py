@@ -34,6 +34,10 @@ Size = tuple[int, int]
 SAME = 0.25  # largest error, in 8-bit levels, of an export that is the same picture
 CLOSE = 40.0  # dB
 NEARLY = 6.0  # dB below what a size can show at which a drawing is still close: twice the error
+SMALL, SMALL_LIMIT = (
+    b'fill="currentColor"',
+    36.0,
+)  # of a small SVG, in dB: it is near the picture, not the render
 FINER = 4  # times across: a canvas whose means stand for what covers each pixel
 LARGEST_FITTED = 512  # shortest side at which the fitted size is checked
 
@@ -68,7 +72,7 @@ class Check:
 def legend() -> str:
     """What the verdicts mean."""
     return f"""same: off by at most {SAME:g} of 255 levels anywhere
-close: at least {CLOSE:g} dB; of a drawing in few pixels, at most {NEARLY:g} dB below what so few can show
+close: at least {CLOSE:g} dB; of a drawing in few pixels, at most {NEARLY:g} dB below what so few can show; of a small SVG {SMALL_LIMIT - NEARLY:g} dB
 differs: neither; errors are in levels, the mean is signed"""
 
 
@@ -142,7 +146,11 @@ def check(
         found = [compare(trip, made, scene, size, expected(*size)) for size in drawn_at]
         if trip.any_shape:
             return found
-        return [replace(c, limit=limit(c.width, c.height)) if c.psnr < CLOSE else c for c in found]
+        if SMALL in made.raw:
+            found = [replace(c, limit=SMALL_LIMIT) for c in found]
+        return [
+            replace(c, limit=min(c.limit, limit(c.width, c.height))) if c.psnr < CLOSE else c for c in found
+        ]
 
     return [result for trip in trips for result in check_trip(trip)]
 

