@@ -72,7 +72,7 @@ class Check:
 def legend() -> str:
     """What the verdicts mean."""
     return f"""same: off by at most {SAME:g} of 255 levels anywhere
-close: at least {CLOSE:g} dB; of a drawing in few pixels, at most {NEARLY:g} dB below what so few can show; of a small SVG {SMALL_LIMIT - NEARLY:g} dB
+close: at least {CLOSE:g} dB, of a small SVG {SMALL_LIMIT - NEARLY:g}; in few pixels, {NEARLY:g} dB below what so few can show at most
 differs: neither; errors are in levels, the mean is signed"""
 
 
