@@ -71,8 +71,9 @@ class Check:
 
 def legend() -> str:
     """What the verdicts mean."""
+    small = SMALL_LIMIT - NEARLY
     return f"""same: off by at most {SAME:g} of 255 levels anywhere
-close: at least {CLOSE:g} dB, of a small SVG {SMALL_LIMIT - NEARLY:g}; in few pixels, {NEARLY:g} dB below what so few can show at most
+close: at least {CLOSE:g} dB, of a small SVG {small:g}; in few pixels, at most {NEARLY:g} dB below what they can show
 differs: neither; errors are in levels, the mean is signed"""
 
 
