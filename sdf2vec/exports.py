@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
-from functools import cached_property, partial
+from functools import cache, cached_property, partial
 from typing import TYPE_CHECKING
 
 from msgspec import structs
@@ -50,6 +50,11 @@ class Exports:
 
     def __init__(self, scene: Scene, picture: Picture | None = None) -> None:
         self.scene, self.picture = scene, picture
+        self._drawn, self._views, self._near = (
+            cache(self._fit_small),
+            cache(self._views_of),
+            cache(self._psnr),
+        )
 
     def export(self, target: str, options: Options | None = None) -> Exported:
         """One export. Raises Sdf2vecError for an unknown target and for what the exporter can't do."""
@@ -96,16 +101,16 @@ class Exports:
 
     def _near_enough(self, exporter: Exporter, scene: Scene, options: Options) -> Exported | None:
         """The smallest drawing that loses hardly anything of the picture."""
-        picture, wanted = self.picture, options.svg_fidelity == PICTURE and "svg_fidelity" in exporter.heeds
-        if not wanted or picture is None or not (exporter.draw and exporter.draws(scene, options)):
+        wanted = options.svg_fidelity == PICTURE and self.picture is not None
+        if not wanted or not (exporter.draw and exporter.draws(scene, options)):
             return None
         if len(scene.layers) <= FEW and not any(layer.falloff for layer in scene.layers):
             return None  # plain elements, with names
-        near = _psnr_of(scene, picture)
+        near = self._near(scene)
         for grain in USUAL:
             drawn = self._drawn(scene, grain)
             made = exporter.draw(drawn, options, grain)
-            wrong = 10 ** (-_psnr_of(drawn, picture) / 10) + (made.error / 255) ** 2
+            wrong = 10 ** (-self._near(drawn) / 10) + (made.error / 255) ** 2
             lost = near + 10 * math.log10(max(wrong, 1e-12))
             if lost <= (LITTLE if grain is USUAL[-1] else HARDLY):
                 return replace(
@@ -118,18 +123,21 @@ class Exports:
     ) -> Iterator[Callable[[], Exported]]:
         """What may keep to a size limit."""
         draw = exporter.draw if exporter.draw and exporter.draws(scene, options) else None
-        near = None
-        if draw and limit.share(draw(_rounded(scene, USUAL[0]), options, USUAL[0]).raw) <= ABOUT:
-            near = self._near_enough(exporter, scene, options)
+        if draw is None:
+            yield from exporter.from_finest(scene, options)
+            return
+
+        @cache
+        def may_fit(grain: Grain) -> bool:
+            return limit.share(draw(_rounded(scene, grain), options, grain).raw) <= ABOUT
+
+        near = self._near_enough(exporter, scene, options) if may_fit(USUAL[0]) else None
         if near:
             yield lambda: near
         else:
             yield from exporter.from_finest(scene, options)
-        if draw is None:
-            return
         for grain in GRAINS:
-            about = draw(_rounded(scene, grain), options, grain)
-            if grain is GRAINS[-1] or limit.share(about.raw) <= ABOUT:
+            if grain is GRAINS[-1] or may_fit(grain):
                 yield partial(self._draw_small, draw, scene, options, grain)
 
     def _draw_small(
@@ -139,18 +147,17 @@ class Exports:
         note = f"drawn small: {grain.units} steps along the shortest side, {grain.colors} of a colour"
         return replace(made, notes=(note, *made.notes))
 
-    def _drawn(self, scene: Scene, grain: Grain) -> Scene:
-        """The scene nearest to the picture that a drawing of this grain can say; made once."""
-        if grain not in self._small:
-            self._small[grain] = _drawable(scene, self._views(scene), grain)
-        return self._small[grain]
+    def _fit_small(self, scene: Scene, grain: Grain) -> Scene:
+        """The scene nearest to the picture that a drawing of this grain can say."""
+        return _drawable(scene, self._views(scene), grain)
 
-    @cached_property
-    def _small(self) -> dict[Grain, Scene]:
-        return {}
-
-    def _views(self, scene: Scene) -> Callable[[float], View]:
+    def _views_of(self, scene: Scene) -> Callable[[float], View]:
         return _views_of(self.picture) if self.picture else _views_of_render(scene)
+
+    def _psnr(self, scene: Scene) -> float:
+        """How near a scene is to the picture, in dB."""
+        assert self.picture is not None
+        return _psnr_of(scene, self.picture)
 
 
 def _lost(decibels: float) -> str:

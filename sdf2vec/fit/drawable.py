@@ -7,17 +7,15 @@ loses by it (as in incremental network quantization, Zhou et al. 2017).
 from __future__ import annotations
 
 import math
-import warnings
 from collections.abc import Callable
 from functools import cache
-from typing import Any
 
 import numpy as np
 import torch
 
 from ..arrays import Float64Array
 from ..blend import EDGE_DEVIATION
-from ..deferred import deferred
+from ..clusters import clustered
 from ..grain import Grain
 from ..image import Picture, fitted_size
 from ..layer import Slot
@@ -45,8 +43,6 @@ PHASES = (
     Phase("drawing", 60, 320, rate=0.12, end_rate=0.05, loss=L1_MSE),
 )
 LATE, FIRM = 0.3, 0.95  # shares of the steps after which colours begin to settle, and all have
-
-kmeans2: Callable[..., Any] = deferred("scipy.cluster.vq", "kmeans2")
 
 
 def views_of(picture: Picture) -> Callable[[float], View]:
@@ -121,11 +117,7 @@ def softnesses(deviations: Float64Array, count: int) -> Float64Array:
     wide = deviations >= LEAST_FREE
     if wide.any():
         logs = np.log(np.maximum(deviations[wide], LEAST))
-        first = np.unique(np.quantile(logs, (np.arange(count) + 0.5) / count))
-        with warnings.catch_warnings():  # that a class is empty: there may be fewer softnesses than classes
-            warnings.simplefilter("ignore", UserWarning)
-            centers, labels = kmeans2(logs, first, minit="matrix", missing="warn")
-        found[wide] = np.exp(centers[labels])
+        found[wide] = np.exp(clustered(logs, count))
     return found
 
 

@@ -7,14 +7,12 @@ solved for with all that is coarse about the drawing known.
 from __future__ import annotations
 
 import math
-import warnings
-from collections.abc import Callable, Mapping, Sequence
-from typing import Any
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 
 from ...blend import EDGE_DEVIATION
-from ...deferred import deferred
+from ...clusters import clustered
 from ...grain import Grain
 from ...outlines import EllipseOutline, Outline, PolygonOutline
 from ...scene import Layer, Scene
@@ -26,8 +24,6 @@ from .refit_appearance import Difference
 from .sampling import distances
 
 TOLERANCE = 0.5  # user units that a traced contour may be off
-
-kmeans2: Callable[..., Any] = deferred("scipy.cluster.vq", "kmeans2")
 
 
 def compact_blurs(
@@ -55,11 +51,7 @@ def softnesses(falloffs: Sequence[float], canvas: Canvas, count: int) -> list[fl
     wanted = np.log([max(EDGE_DEVIATION * falloff, least) for falloff in falloffs if falloff])
     if not wanted.size:
         return [0.0] * len(falloffs)
-    first = np.unique(np.quantile(wanted, (np.arange(count) + 0.5) / count))
-    with warnings.catch_warnings():  # that a class is empty: there may be fewer softnesses than classes
-        warnings.simplefilter("ignore", UserWarning)
-        centers, labels = kmeans2(wanted, first, minit="matrix", missing="warn")
-    found = iter(np.exp(centers[labels]).tolist())
+    found = iter(np.exp(clustered(wanted, count)).tolist())
     return [next(found) if falloff else 0.0 for falloff in falloffs]
 
 
