@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 import torch
 
-from .fit.loop import scaled
+from .fit.views import scaled
 from .flip import flip
 from .image import Picture
 from .metrics import psnr

@@ -27,13 +27,14 @@ from .backends import CPU, choose
 from .byte_budget import SLOPE, Share, within
 from .initialization import Layers, background_of, empty_groups
 from .joining import Search
-from .loop import Callback, Progress, Stopped, fit_picture, scaled, view_of
+from .loop import Callback, Progress, Stopped, fit_picture
 from .matching_pursuit import Missing, Painted, find_discs
 from .offers import common_color
 from .settings import AUTO, Settings, preset_of
 from .simplify import simplified
 from .sparse import FLOOR, Round, Sizes, error_of, finished, grow, needed, pruned
 from .surroundings import View
+from .views import scaled, view_of
 
 SEARCH, JOINT, LAST = 56, 128, 320  # pixels squared
 FEW = 4  # shapes that are placed by trial, also where their number is given

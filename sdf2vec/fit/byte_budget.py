@@ -14,10 +14,11 @@ from ..quality import psnr_of
 from ..render.tensors import SceneTensors, from_scene, to_scene
 from ..scene import Scene
 from .initialization import background_of
-from .loop import Callback, fit_picture, view_of
+from .loop import Callback, fit_picture
 from .settings import Settings
 from .sparse import error_of, without
 from .surroundings import View
+from .views import view_of
 
 Share = Callable[[Scene], float]  # of a size limit, above 1 for what is too large
 PROBED = 16  # shapes of each sort that are tried first

@@ -26,10 +26,10 @@ from ..scene import Scene
 from ..units import COLOR, FALLOFF, OPACITY, POSITION
 from .adam import adam_over
 from .constraints import project
-from .loop import scaled
 from .losses import objective
 from .presets import L1_MSE, Phase
 from .surroundings import View
+from .views import scaled
 
 HARDLY = 0.6  # pixels: an edge of a smaller standard deviation is drawn sharp
 NARROWEST = (1.1, 1.5)  # pixels: of the narrowest blurs, on which renderers agree more or less

@@ -28,12 +28,16 @@ START_SMOOTHNESS = 0.25  # of a smooth union, of the size of its layer
 
 @dataclass(frozen=True)
 class Layers:
-    """What new layers are made of: any of these kinds in this paint, so many joined in each, under this compositing."""
+    """What new layers are made of: any of these kinds in this paint, so many joined in each, under this compositing.
+
+    `shares`: how much of the layers each kind gets, summing to 1; all the same without.
+    """
 
     kinds: tuple[str, ...]
     compositing: str
     union: int = 1
     paint: str = FLAT
+    shares: tuple[float, ...] = ()
 
     @property
     def structures(self) -> list[Structure]:
@@ -99,14 +103,22 @@ def place(
 def groups_at(places: Places, layers: Layers, generator: torch.Generator, first: int = 0) -> list[Group]:
     """New layers at these places, one group for each kind; their draw order begins with `first`.
 
-    Several kinds are dealt out at random.
+    Several kinds are dealt out at random, in their shares.
     """
-    dealt = torch.randint(len(layers.kinds), (len(places),), generator=generator)
+    dealt = _deal(layers, len(places), generator)
     return [
         _group(structure, first + rows, places.rows(rows), layers, generator)
         for index, structure in enumerate(layers.structures)
         for rows in [(dealt == index).nonzero()[:, 0]]
     ]
+
+
+def _deal(layers: Layers, count: int, generator: torch.Generator) -> torch.Tensor:
+    """Which kind each of so many layers gets, [count]."""
+    if not layers.shares:
+        return torch.randint(len(layers.kinds), (count,), generator=generator)
+    ends = torch.tensor(layers.shares).cumsum(0)[:-1]
+    return torch.bucketize(torch.rand(count, generator=generator), ends, right=True)
 
 
 def empty_groups(layers: Layers) -> list[Group]:

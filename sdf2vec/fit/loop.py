@@ -8,12 +8,11 @@ from contextlib import suppress
 from dataclasses import dataclass, replace
 from functools import cached_property, partial
 
-import numpy as np
 import torch
 
 from ..deferred import deferred
 from ..errors import Sdf2vecError
-from ..image import Picture, premultiply, resize, unpremultiply
+from ..image import Picture
 from ..render import fused
 from ..render.tensors import Group, SceneTensors, from_scene, on_device, to_scene
 from ..scene import Scene
@@ -27,11 +26,13 @@ from .initialization import Layers, background_of, empty_groups, place, tell_apa
 from .joining import RESOLUTIONS as JOIN_RESOLUTIONS
 from .joining import Search, join
 from .losses import Objective, objective
-from .presets import CROWDING, MSE, Phase, Start
+from .pilots import PHASE as PILOT
+from .pilots import pilot_preset, pilot_settings, shares_of
+from .presets import CROWDING, MSE, Phase, Preset, Start
 from .settings import Settings, preset_of
 from .steady import HARDLY_SEEN, MATTERS, Steady
 from .surroundings import View
-from .weights import weights_for
+from .views import scaled, view_of
 
 THICKEN_EVERY = 10  # steps
 AREA_WEIGHT = 1.0  # of the area constraint in the loss
@@ -42,6 +43,7 @@ ANYWHERE = Start("uniform")
 restrict_colors: Callable[..., None] = deferred(
     "sdf2vec.fit.palette", "restrict"
 )  # scipy: most fits don't need it
+LEAST_ERROR = 1e-8  # mean squared, of a pilot: 80 dB
 SAME_SHAPE = 0.01  # scene units by which a start scene's canvas may differ
 
 
@@ -94,9 +96,11 @@ class Stage:
 class Fit:
     """What a fit works with: settings, the picture's pixels, the scene as it is now, the optimiser."""
 
-    def __init__(self, picture: Picture, settings: Settings, callback: Callback) -> None:
-        self.settings, self.callback = settings, callback
-        self.preset = preset_of(settings)
+    def __init__(
+        self, picture: Picture, settings: Settings, callback: Callback, preset: Preset | None = None
+    ) -> None:
+        self.settings, self.callback, self.picture = settings, callback, picture
+        self.preset = preset or preset_of(settings)
         self.backend: Backend = choose(settings.device)
         self.generator = torch.Generator().manual_seed(settings.seed)
         self.pixels = picture.premultiplied
@@ -105,6 +109,9 @@ class Fit:
         self.size = (picture.width * self.pixel, picture.height * self.pixel)
         self.wanted = settings.most // settings.union  # layers
         self.done, self.steps, self.stopped = 0, self._count_steps(), False
+        self.layers = Layers(
+            settings.kinds, settings.compositing, settings.union, settings.paint, self._shares()
+        )
         self.tensors = self._start()
         self._announce_compiling()
         self.tensors = on_device(self.tensors, self.backend.device)
@@ -160,14 +167,41 @@ class Fit:
         losses = {name for phase in self.phases for name, _ in phase.loss}
         return adam_over(self.tensors, self.preset.crowding if "ssim" in losses else CROWDING, frozen)
 
+    @property
+    def _pilots(self) -> tuple[str, ...]:
+        """The kinds that are tried, each alone, before the fit."""
+        kinds = self.settings.kinds
+        return kinds if len(kinds) > 1 and self.settings.start is None and self.wanted > len(kinds) else ()
+
+    def _shares(self) -> tuple[float, ...]:
+        """How much of the layers each kind gets; nothing where that is not tried."""
+        return shares_of([self._try_kind(kind) for kind in self._pilots]) if self._pilots else ()
+
+    def _try_kind(self, kind: str) -> float:
+        """How near a short fit with this kind alone comes to the picture, in dB."""
+        before = self.done
+
+        def tick(progress: Progress) -> bool:
+            self.done = before + progress.step
+            return self.callback(replace(progress, step=self.done, steps=self.steps))
+
+        settings = pilot_settings(self.settings, kind, self.wanted)
+        pilot = Fit(self.picture, settings, tick, pilot_preset(self.preset))
+        with suppress(Stopped):
+            pilot._train_all()
+        stage = pilot.finest
+        with torch.no_grad():
+            wrong = objective(MSE, stage.target, stage.weights)(pilot._draw(pilot.tensors, stage.target))
+        return -10.0 * math.log10(max(float(wrong), LEAST_ERROR))
+
     def _count_steps(self) -> int:
-        steps = sum(phase.total for phase in self.phases)
+        steps = sum(phase.total for phase in self.phases) + len(self._pilots) * PILOT.steps
         steps += self.settings.trials * TRIAL_STEPS + self.settings.cuts * JOIN_STEPS
         return steps + (REFIT_STEPS if self.settings.palette or self.settings.colors else 0)
 
     def _start(self) -> SceneTensors:
         target = scaled(self.pixels, self._resolution(self.phases[0]))
-        settings, layers = self.settings, _layers_of(self.settings)
+        settings, layers = self.settings, self.layers
         if settings.start is None:
             growth = self.phases[0].growth
             count = growth.count(0, self.phases[0].steps, self.wanted) if growth else self.wanted
@@ -207,7 +241,7 @@ class Fit:
         weights: torch.Tensor | None = None,
     ) -> None:
         """New layers where they help most; anywhere, when none would help."""
-        layers, full = _layers_of(self.settings), tensors.layer_count + count
+        layers, full = self.layers, tensors.layer_count + count
         _join_groups(
             tensors, optimizer, densify(image, target, count, tensors, layers, self.generator, weights)
         )
@@ -217,7 +251,7 @@ class Fit:
 
     def _anywhere(self, target: torch.Tensor, count: int, first: int) -> list[Group]:
         """New layers anywhere, in the picture's colours, their draw order beginning with `first`."""
-        groups = place(target, self.size, _layers_of(self.settings), count, ANYWHERE, self.generator).groups
+        groups = place(target, self.size, self.layers, count, ANYWHERE, self.generator).groups
         for group in groups:
             group.order += first
         return groups
@@ -367,7 +401,7 @@ class Fit:
             self.done = min(self.done + 1, last)
             self._report(phases[0], loss)
 
-        search = Search(_layers_of(self.settings), self.preset.falloff, self.generator, tick, self.pixel)
+        search = Search(self.layers, self.preset.falloff, self.generator, tick, self.pixel)
         try:
             for scene in join(on_device(self.tensors, "cpu"), views, search, self.settings.cuts):
                 self.tensors = on_device(scene, self.backend.device)
@@ -398,7 +432,7 @@ class Fit:
         self._settle(stage)
         image = self._draw(self.tensors, stage.target)
         scores = self._scores(image, stage)
-        layers = _layers_of(self.settings)
+        layers = self.layers
         fresh = densify(image, stage.target, count, self.tensors, layers, self.generator, stage.weights)
         relocate(self.tensors, self.optimizer, scores, fresh)
 
@@ -429,10 +463,6 @@ def _join_groups(tensors: SceneTensors, optimizer: Adam, fresh: list[Group]) -> 
     exchange(tensors, optimizer, [torch.arange(len(group)) for group in tensors.groups], fresh)
 
 
-def _layers_of(settings: Settings) -> Layers:
-    return Layers(settings.kinds, settings.compositing, settings.union, settings.paint)
-
-
 def _check_start(scene: Scene, size: tuple[float, float]) -> None:
     if max(abs(a - b) for a, b in zip(scene.extent, size, strict=True)) > SAME_SHAPE:
         wide, high = (f"{side:.3g}" for side in scene.extent)
@@ -455,24 +485,3 @@ def _freeze(tensors: SceneTensors, moves: Callable[[Group], torch.Tensor]) -> No
                 tensor.grad[still] = 0.0
     if tensors.background.grad is not None:
         tensors.background.grad.zero_()
-
-
-def scaled(pixels: np.ndarray, resolution: float) -> torch.Tensor:
-    """A picture, premultiplied [H, W, C], scaled down to about resolution² pixels, [C, H, W]; never up.
-
-    A resolution below 1 is a share of the picture's own.
-    """
-    height, width, channels = pixels.shape
-    factor = resolution if resolution < 1 else min(1.0, resolution / math.sqrt(width * height))
-    size = max(1, round(width * factor)), max(1, round(height * factor))
-    small = premultiply(resize(unpremultiply(pixels), *size)) if channels == 4 else resize(pixels, *size)
-    return torch.from_numpy(np.ascontiguousarray(small.transpose(2, 0, 1)))
-
-
-def view_of(pixels: np.ndarray, settings: Settings, resolution: float) -> View:
-    """A picture scaled down, with the weights that the settings give its pixels."""
-    target = scaled(pixels, resolution)
-    if settings.weights is None:
-        return View(target, None)
-    height, width = target.shape[1:]
-    return View(target, torch.from_numpy(weights_for(settings.weights, width, height)))

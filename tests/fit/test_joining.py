@@ -11,9 +11,10 @@ import torch
 import sdf2vec
 from sdf2vec.fit import joining
 from sdf2vec.fit.initialization import Layers
-from sdf2vec.fit.loop import fit_picture, scaled
+from sdf2vec.fit.loop import fit_picture
 from sdf2vec.fit.settings import Settings, settings_of
 from sdf2vec.fit.surroundings import View
+from sdf2vec.fit.views import scaled
 from sdf2vec.image import Picture
 from sdf2vec.metrics import psnr
 from sdf2vec.render.reference import render

@@ -12,9 +12,10 @@ from sdf2vec.blend import COMPOSITING
 from sdf2vec.fit import backends, constraints, loop, losses
 from sdf2vec.fit.adam import adam_over
 from sdf2vec.fit.initialization import Layers, detail, place
-from sdf2vec.fit.loop import Progress, fit_picture, scaled
+from sdf2vec.fit.loop import Progress, fit_picture
 from sdf2vec.fit.presets import PRESETS, Start
 from sdf2vec.fit.settings import Settings
+from sdf2vec.fit.views import scaled
 from sdf2vec.layer import Part
 from sdf2vec.metrics import mse, psnr
 from sdf2vec.render import culled, kernels, triton_fused

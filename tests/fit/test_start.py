@@ -11,6 +11,7 @@ from sdf2vec.fit import loop
 from sdf2vec.fit.loop import Fit, Progress
 from sdf2vec.fit.presets import PRESETS
 from sdf2vec.fit.settings import settings_of
+from sdf2vec.fit.views import scaled
 from sdf2vec.image import Picture
 from sdf2vec.render.reference import render
 from tests.fit.fitting import (
@@ -54,7 +55,7 @@ def test_a_start_of_another_size_draws_the_same():
     seen: list[Progress] = []
     scene = fitted(picture(48, 32), start=start, callback=remember(seen))
     assert (scene.width, scene.height) == (48, 32)
-    target = loop.scaled(picture(48, 32).pixels, 48)
+    target = scaled(picture(48, 32).pixels, 48)
     drawn = render(start, target.shape[2], target.shape[1])[:3]
     assert seen[0].loss == pytest.approx(float((drawn - target).abs().mean()), rel=1e-3)
 
