@@ -210,3 +210,11 @@ def test_the_cache_command(tmp_path, run, monkeypatch):
     assert run("cache", "--clear") == (0, b"1 files removed, 0 left\n", "")
     assert os.listdir(tmp_path) == ["mine.txt"]
     assert_refused(run("cache"), "--path", "--size", "--clear")
+
+
+def test_the_package_runs_as_the_program_does():
+    done = subprocess.run(
+        [sys.executable, "-m", "sdf2vec", "nothing.png"], capture_output=True, text=True, check=False
+    )
+    assert (done.returncode, done.stdout) == (2, "")
+    assert done.stderr == "sdf2vec: nothing.png: no such file\n"
