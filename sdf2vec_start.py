@@ -6,5 +6,7 @@ signal.signal(signal.SIGINT, signal.SIG_DFL)
 
 from sdf2vec.cli import main  # noqa: E402 (see above)
 
+__all__ = ["main"]
+
 if __name__ == "__main__":
     main()

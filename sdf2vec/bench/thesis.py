@@ -67,8 +67,7 @@ def page(name: str, output: Path) -> str:
                 "`thesis` here: its method by the fused kernels, on the CPU; what it leaves open is stated in "
                 "`fit/presets.py`. `balanced`: the default fit with the same kind, number and compositing, by "
                 "its own loss. Where shapes are joined, the number counts shapes, not layers. Seconds include "
-                "compiling kernels when a kind is new. Its rates are not known; at ours, SSIM runs away with more "
-                "than 256 layers, so there they fall faster (`Preset.crowding`).",
+                "compiling kernels when a kind is new.",
                 "\n".join(rows(load(name))),
             )
         )

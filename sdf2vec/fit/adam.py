@@ -110,7 +110,7 @@ def rate_of(unit: Unit, canvas: float, crowd: float) -> float:
     return unit.rate * (crowd if unit.crowded else 1.0) * canvas**unit.scaling
 
 
-def adam_over(tensors: SceneTensors, crowding: float = CROWDING, frozen: tuple[str, ...] = ()) -> Adam:
+def adam_over(tensors: SceneTensors, frozen: tuple[str, ...] = ()) -> Adam:
     """Adam over all that may move, each tensor at the rate of its unit; `frozen`: names of units that may not."""
     free = [(slot.parameter.unit, v) for group in tensors.groups for slot, v in group.values.items()]
     if not tensors.transparent:
@@ -118,6 +118,6 @@ def adam_over(tensors: SceneTensors, crowding: float = CROWDING, frozen: tuple[s
     if tensors.opaque and not COMPOSITING[tensors.compositing].hides:  # what is added to alpha is never seen
         frozen = (*frozen, OPACITY.name)
     few = MANY / max(1, tensors.layer_count)
-    crowd = few ** (crowding if few < 1 else CROWDING)
+    crowd = few**CROWDING
     canvas = math.sqrt(tensors.size[0] * tensors.size[1])
     return Adam((tensor, rate_of(unit, canvas, crowd)) for unit, tensor in free if unit.name not in frozen)

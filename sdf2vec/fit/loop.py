@@ -28,7 +28,7 @@ from .joining import Search, join
 from .losses import Objective, objective
 from .pilots import PHASE as PILOT
 from .pilots import pilot_preset, pilot_settings, shares_of
-from .presets import CROWDING, MSE, Phase, Preset, Start
+from .presets import MSE, Phase, Preset, Start
 from .settings import Settings, preset_of
 from .steady import HARDLY_SEEN, MATTERS, Steady
 from .surroundings import View
@@ -164,8 +164,7 @@ class Fit:
         return self._stage(self.phases[-1])
 
     def _adam(self, frozen: tuple[str, ...] = ()) -> Adam:
-        losses = {name for phase in self.phases for name, _ in phase.loss}
-        return adam_over(self.tensors, self.preset.crowding if "ssim" in losses else CROWDING, frozen)
+        return adam_over(self.tensors, frozen)
 
     @property
     def _pilots(self) -> tuple[str, ...]:

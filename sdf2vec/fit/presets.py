@@ -97,8 +97,7 @@ class Start:
 class Preset:
     """A whole fit. `compositing`: the only one that it is for; `falloff`: its range in scene units;
     `least_area`: of a shape, in shares of the canvas; smaller ones are pushed to grow; `sharpens`: whether the
-    phases' resolution grows with the number of shapes; `crowding`: the power by which rates fall
-    beyond `MANY` layers when the loss is SSIM, `CROWDING` otherwise.
+    phases' resolution grows with the number of shapes.
     """
 
     phases: tuple[Phase, ...]
@@ -107,7 +106,6 @@ class Preset:
     falloff: tuple[float, float] = (0.0, SOFTEST)
     least_area: float = 0.0
     sharpens: bool = True
-    crowding: float = CROWDING
 
     def resolution(self, phase: Phase, shapes: int) -> float:
         """A phase's resolution for so many shapes: what is drawn with many needs more pixels to tell them apart."""
@@ -156,18 +154,18 @@ PRESETS: dict[str, Preset] = {
             Phase("fine", 400, 512, rate=0.6, end_rate=0.02, loss=L1_MSE_FLIP),
         )
     ),
-    # Of the thesis. It leaves open: where shapes start (anywhere), the size of a batch (a quarter of the layers), the
-    # least area of its constraint (that of a disc of a hundredth of the canvas' side), and Adam's rates (ours).
+    # Of the thesis. It leaves open: where shapes start (anywhere), how soft they are then (a twentieth of the shortest
+    # side: where wide ones all lie on each other, many never come apart), the size of a batch (a quarter of the layers),
+    # the least area of its constraint (that of a disc of a hundredth of the canvas' side), and Adam's rates (ours).
     "thesis": Preset(
         (
             Phase("global", 600, 128, loss=MSE),
             Phase("batches", 200, 0.5, rate=0.5, end_rate=0.05, loss=MSE, batches=4),
         ),
-        Start("uniform", "zero", 0.5),
+        Start("uniform", "zero", 0.05),
         compositing="additive",
         falloff=(0.01, 0.99),
         sharpens=False,
-        crowding=1.5,  # its layers are large and all lie on each other; with more of them, SSIM runs away
         least_area=3e-4,
     ),
 }
