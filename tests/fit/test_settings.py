@@ -51,7 +51,7 @@ def test_the_thesis_preset_keeps_its_ranges(monkeypatch):
 
     monkeypatch.setattr(Fit, "_relocate", never)
     seen: list[Progress] = []
-    scene = fitted(thesis_picture(), 10, kind=["circle", "ellipse"], preset="thesis", callback=remember(seen))
+    scene = fitted(thesis_picture(), 10, kind="ellipse", preset="thesis", callback=remember(seen))
     assert scene.compositing == "additive"
     assert len(seen) == 12 + 4 * 12
     for layer in scene.layers:
