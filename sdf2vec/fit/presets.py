@@ -156,7 +156,8 @@ PRESETS: dict[str, Preset] = {
     ),
     # Of the thesis. It leaves open: where shapes start (anywhere), how soft they are then (a twentieth of the shortest
     # side: where wide ones all lie on each other, many never come apart), the size of a batch (a quarter of the
-    # layers), the least area of its constraint (that of a disc of a hundredth of the canvas' side), and Adam's rates (ours).
+    # layers), the least area of its constraint (that of a disc of a hundredth of the canvas' side), and Adam's rates
+    # (ours).
     "thesis": Preset(
         (
             Phase("global", 600, 128, loss=MSE),
