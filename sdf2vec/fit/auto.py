@@ -30,6 +30,7 @@ from .loop import Callback, Progress, Stopped, fit_picture, scaled, view_of
 from .matching_pursuit import Painted, find_discs
 from .offers import common_color
 from .one_more import gain_of_one_more
+from .ramps import grounded
 from .settings import AUTO, Settings, preset_of
 from .simplify import simplified
 from .sparse import FLOOR, Round, Sizes, error_of, finished, grow, needed, pruned
@@ -204,6 +205,7 @@ class Drawing:
         """The scene, as simple as it may be."""
         try:
             self._announce_compiling()
+            self.scene = grounded(self.scene, self.sizes.joint, self.search)
             for made in grow(self.scene, self.sizes, self.search, self.settings.most, self.floor):
                 self.scene = made.scene
                 if self._is_no_drawing(made):
