@@ -32,32 +32,39 @@ def scene(*shapes):
     return Scene(48, 48, tuple(Layer((shape,)) for shape in shapes), (1.0, 1.0, 1.0))
 
 
+def disc(color, x):
+    return Shape.of("circle", color, center=(x, 0.0), radius=0.2)
+
+
+def box(end=None):
+    paint = {"paint": "linear", "color_end": end, "direction": (0.5, 0.0)} if end else {}
+    return Shape.of(
+        "box", RED, **paint, center=(0.0, 0.0), half_size=(0.3, 0.2), angle=0.0, corner_radius=0.0
+    )
+
+
 def test_colours_that_are_close_become_one():
-    left, right = ({"center": (x, 0.0), "radius": 0.2} for x in (-0.25, 0.25))
     blue = Shape.of("circle", (0.1, 0.1, 0.9), center=(0.0, 0.35), radius=0.1)
     found = as_simple_as_drawn(
-        scene(Shape.of("circle", RED, **left), Shape.of("circle", ALMOST, **right), blue),
-        scene(Shape.of("circle", RED, **left), Shape.of("circle", RED, **right), blue),
+        scene(disc(RED, -0.25), disc(ALMOST, 0.25), blue),
+        scene(disc(RED, -0.25), disc(RED, 0.25), blue),
     )
     first, second, third = (layer.shapes[0].color for layer in found.layers)
     assert first == second != third
 
 
 def test_colours_that_are_seen_to_differ_stay():
-    left, right = ({"center": (x, 0.0), "radius": 0.2} for x in (-0.25, 0.25))
     other = (0.83, 0.13, 0.2)
-    drawn = scene(Shape.of("circle", RED, **left), Shape.of("circle", other, **right))
+    drawn = scene(disc(RED, -0.25), disc(other, 0.25))
     first, second = (layer.shapes[0].color for layer in as_simple_as_drawn(drawn, drawn).layers)
     assert np.allclose((first, second), (RED, other), atol=0.004)
 
 
 def test_a_ramp_of_one_colour_is_flat():
-    box = {"center": (0.0, 0.0), "half_size": (0.3, 0.2), "angle": 0.0, "corner_radius": 0.0}
-    ramp = Shape.of("box", RED, "linear", **box, color_end=ALMOST, direction=(0.5, 0.0))
-    (layer,) = as_simple_as_drawn(scene(ramp), scene(Shape.of("box", RED, **box))).layers
+    (layer,) = as_simple_as_drawn(scene(box(ALMOST)), scene(box())).layers
     assert layer.shapes[0].paint == "flat"
-    steep = Shape.of("box", RED, "linear", **box, color_end=(0.1, 0.5, 0.9), direction=(0.5, 0.0))
-    (layer,) = as_simple_as_drawn(scene(steep), scene(steep)).layers
+    steep = scene(box((0.1, 0.5, 0.9)))
+    (layer,) = as_simple_as_drawn(steep, steep).layers
     assert layer.shapes[0].paint == "linear"
 
 
