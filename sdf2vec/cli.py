@@ -18,6 +18,7 @@ from .batch import READ_TOO, Batch, about, about_left, check_streams, exit_statu
 from .bench import command as benching
 from .checkpoint import OFF
 from .converting import Work, write_exports
+from .curve import check_curves
 from .declared import add_flags, checked, chosen, options_of
 from .deferred import deferred
 from .errors import Sdf2vecError
@@ -53,6 +54,7 @@ OF_FITS = (
     "shard",
     "report",
     "checkpoint",
+    "curve",
 )  # what only fits heed of a run
 WARM_UP = "--warm-up"
 DIFFERS = 1  # exit status of a check
@@ -158,7 +160,8 @@ def _convert(arguments: list[str]) -> int:
     given, running = chosen(options, Settings), _running_of(options)
     also_read = [given[name] for name in READ_TOO if name in given]
     sources = sources_of(options.inputs, running.recursive)
-    jobs = plan(sources, places, also_read, running.force, running.checkpoint)
+    check_curves(running.curve)
+    jobs = plan(sources, places, also_read, running.force, running.checkpoint, running.curve)
     check_streams(jobs, running)
     work = Work(given, _export_options(options, places.targets), running)
     _check_settings(work, places)

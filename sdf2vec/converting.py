@@ -12,6 +12,7 @@ from msgspec.structs import replace
 from . import api, guard
 from .checkpoint import Checkpoint
 from .compact_file import is_compact
+from .curve import Point, Size, points_of, size_of, write_curve
 from .deferred import deferred
 from .errors import Sdf2vecError
 from .export import EXPORTERS
@@ -20,6 +21,7 @@ from .export.exported import Exported
 from .export.options import Options
 from .exports import Exports, share_of_limit
 from .files import one_line, shown_as, write_atomically
+from .fit.settings import settings_of
 from .outputs import STREAM, Job, beside_of, stem_of
 from .progress import Stop, Teller
 from .running import Running
@@ -95,10 +97,25 @@ def convert(job: Job, work: Work, teller: Teller, stop: Stop) -> Done:
     export = replace(work.export, original=original, near=quality.psnr)
     written = write_exports(scene, job, export, teller, picture)
     checkpoint.remove()
+    if job.curves and not stop.requested:
+        with teller.phase("curve"):
+            first = Point(scene.shape_count, quality.psnr, quality.flip, written.sizes)
+            _write_curves(first, scene, picture, job, work, teller, stop)
     seconds = time.perf_counter() - started
     teller.say(f"  {seconds:.1f} s in all{_phases(teller)}")
     met = fitted.met and written.met
     return Done(scene.shape_count, quality.psnr, quality.flip, written.bytes, seconds, stop.requested, met)
+
+
+def _write_curves(
+    first: Point, scene: Scene, picture: Picture, job: Job, work: Work, teller: Teller, stop: Stop
+) -> None:
+    """What fewer of the shapes come to."""
+    options = replace(work.export, title=_title(job, work.export))
+    points = points_of(first, scene, picture, settings_of(**work.fit), options, lambda: stop.requested)
+    for path in job.curves:
+        write_curve(points, path)
+        teller.say(f"  {path}: {len(points)} numbers of shapes, {points[-1].shapes} to {points[0].shapes}")
 
 
 def _phases(teller: Teller) -> str:
@@ -169,10 +186,11 @@ def _name(source: str) -> str:
 
 
 class Written(NamedTuple):
-    """How many bytes there are in all, and whether all keep to the size limit."""
+    """How many bytes there are in all, whether all keep to the size limit, and how large those of shapes are."""
 
     bytes: int
     met: bool
+    sizes: Mapping[str, Size]  # by target
 
 
 def write_exports(
@@ -181,11 +199,14 @@ def write_exports(
     """Writes the exports of a scene, by default titled after the input."""
     title = _title(job, options)
     exports, written, met = Exports(scene, picture), 0, True
+    sizes = dict[str, Size]()
     for target, path in job.outputs.items():
         chosen = replace(options, title=title, alone=path == STREAM)
         with teller.phase(f"export {target}"):
             made = exports.export(target, chosen)
         _write(path, made.raw)
+        if not EXPORTERS[target].is_picture:
+            sizes[target] = size_of([made.raw, *made.beside.values()])
         written, met = written + len(made.raw), met and made.met
         if path != STREAM:
             with teller.phase(f"check {target}"):
@@ -194,7 +215,7 @@ def write_exports(
             written += _write_beside(path, EXPORTERS[target].suffix, made.beside, teller)
         for note in made.notes:
             teller.say(f"  {note}")
-    return Written(written, met)
+    return Written(written, met, sizes)
 
 
 def _write_beside(path: str, suffix: str, files: Mapping[str, bytes], teller: Teller) -> int:

@@ -35,9 +35,15 @@ def choice(title: str, description: str, known: Collection[str]) -> msgspec.Meta
     return msgspec.Meta(title=title, description=description, extra={"known": known})
 
 
-def plain(description: str, metavar: str | None = None, short: str = "") -> msgspec.Meta:
-    """Anything: a switch, or what is read elsewhere; `short` is a letter that is a flag, too."""
-    return msgspec.Meta(description=description, extra={"metavar": metavar, "short": short})
+def plain(
+    description: str, metavar: str | None = None, short: str = "", several: bool = False
+) -> msgspec.Meta:
+    """Anything: a switch, or what is read elsewhere; `short` is a letter that is a flag, too. `several`: a tuple, a
+    flag for each.
+    """
+    return msgspec.Meta(
+        description=description, extra={"metavar": metavar, "short": short, "several": several}
+    )
 
 
 @dataclass(frozen=True)
@@ -98,6 +104,7 @@ class Option:
         if self.type is not bool:
             form = {"type": self._read if self.type in NUMBERS else str}
             form["metavar"] = self._extra.get("metavar")
+            form["action"] = "append" if self._extra.get("several") else "store"
         short = [f"-{self._extra['short']}"] if self._extra.get("short") else []
         told = self.help.replace("%", "%%")
         parser.add_argument(*short, self.flag, default=argparse.SUPPRESS, help=told, **form)

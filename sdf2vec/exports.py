@@ -78,6 +78,17 @@ class Exports:
             return exporter.draw(_rounded(scene, DENSE), options, DENSE)
         return exporter.from_finest(scene, options)[-1]()
 
+    def sketched(self, target: str, options: Options) -> Exported:
+        """One export, about as large as it would be: a small drawing's numbers are rounded, not fitted again."""
+        if options.max_bytes is not None:
+            return self.densest(target, options)
+        exporter = EXPORTERS[target]
+        scene = self._over[0] if exporter.accepts(options).refusal(self.scene) else self.scene
+        is_small = options.svg_fidelity == PICTURE and not _is_plain(scene)
+        if exporter.draw and is_small and exporter.draws(scene, options):
+            return exporter.draw(_rounded(scene, USUAL[0]), options, USUAL[0])
+        return exporter.from_finest(scene, options)[0]()
+
     @cached_property
     def _over(self) -> tuple[Scene, float]:
         return _over_of(self.scene)
@@ -104,8 +115,8 @@ class Exports:
         wanted = options.svg_fidelity == PICTURE and self.picture is not None
         if not wanted or not (exporter.draw and exporter.draws(scene, options)):
             return None
-        if len(scene.layers) <= FEW and not any(layer.falloff for layer in scene.layers):
-            return None  # plain elements, with names
+        if _is_plain(scene):
+            return None
         near = self._near(scene)
         for grain in USUAL:
             drawn = self._drawn(scene, grain)
@@ -158,6 +169,11 @@ class Exports:
         """How near a scene is to the picture, in dB."""
         assert self.picture is not None
         return _psnr_of(scene, self.picture)
+
+
+def _is_plain(scene: Scene) -> bool:
+    """Whether an SVG of plain elements, with names, is small enough."""
+    return len(scene.layers) <= FEW and not any(layer.falloff for layer in scene.layers)
 
 
 def _lost(decibels: float) -> str:

@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import base64
 import os
-from collections.abc import Collection, Iterable, Mapping, Sequence
+from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from urllib.parse import unquote_to_bytes
 
 from . import remote
 from .checkpoint import OFF, SUFFIX
+from .curve import mark_of
 from .declared import check_choice
 from .errors import Sdf2vecError
 from .export import EXPORTERS, Exporter
@@ -28,6 +29,7 @@ class Job:
     source: str
     outputs: Mapping[str, str]  # target → path or "-"
     checkpoint: str = ""  # path; empty for none
+    curves: tuple[str, ...] = ()  # paths
 
 
 @dataclass(frozen=True)
@@ -187,10 +189,12 @@ def plan(
     also_read: Collection[str] = (),
     force: bool = False,
     checkpoint: str | None = None,
+    curves: Sequence[str] = (),
 ) -> list[Job]:
     """The files of each input, which is given with the folder inside the output folder that its files go to.
 
-    `checkpoint`: the file of the one input's, "off", or None for one beside the outputs of each.
+    `checkpoint`: the file of the one input's, "off", or None for one beside the outputs of each. `curves`: files of the
+    one input's.
 
     Raises Sdf2vecError, before anything is written, when two exports would share a file, when one can't be written, and
     when one would replace an input, or (without `force`) a file that this program has not made.
@@ -202,25 +206,35 @@ def plan(
         )
     if len(sources) > 1 and checkpoint not in (None, OFF):
         raise Sdf2vecError(f"{one_line(checkpoint)}: is a checkpoint of one input, {len(sources)} are given")
+    if len(sources) > 1 and curves:
+        raise Sdf2vecError(f"{_listed(curves)}: a curve is of one input, {len(sources)} are given")
     outputs = {source: places.outputs(source, within) for source, within in sources.items()}
-    jobs = [Job(source, made, _checkpoint(made, checkpoint)) for source, made in outputs.items()]
+    jobs = [
+        Job(source, made, _checkpoint(made, checkpoint), tuple(curves)) for source, made in outputs.items()
+    ]
     read = {str(Path(path).resolve()) for path in (*sources, *also_read) if path != STREAM}
     taken: dict[str, str] = {}
     tried: set[Path] = set()
+    going_on = {str(Path(path).resolve()) for path in also_read}  # from a checkpoint
     for job in jobs:
-        for target, path in job.outputs.items():
-            if path != STREAM:
-                _claim(path, job.source, taken, read)
-                require_writable(path, tried)
-                if not force:
-                    _refuse_foreign(path, EXPORTERS[target])
-        if job.checkpoint:
-            going_on = {str(Path(path).resolve()) for path in also_read}  # from it
-            _claim(job.checkpoint, job.source, taken, read - going_on)
-            require_writable(job.checkpoint, tried)
+        for path, exporter in _written(job):
+            _claim(path, job.source, taken, read - going_on if path == job.checkpoint else read)
+            require_writable(path, tried)
             if not force:
-                _refuse_foreign(job.checkpoint, EXPORTERS["json"])
+                _refuse_foreign(path, exporter)
+        for path in job.curves:
+            _claim(path, job.source, taken, read)
+            require_writable(path, tried)
+            if not force and _is_ours(path, mark_of(path)) is False:
+                raise _foreign(path, "--curve")
     return jobs
+
+
+def _written(job: Job) -> Iterator[tuple[str, Exporter]]:
+    """The files of a job's exports, and its checkpoint."""
+    yield from ((path, EXPORTERS[target]) for target, path in job.outputs.items() if path != STREAM)
+    if job.checkpoint:
+        yield job.checkpoint, EXPORTERS["json"]
 
 
 def _checkpoint(outputs: Mapping[str, str], given: str | None) -> str:
@@ -248,9 +262,13 @@ def _refuse_foreign(path: str, exporter: Exporter) -> None:
     foreign = [path] if is_ours is False else []
     foreign += [other for other in beside if is_ours is None and _is_ours(other, exporter.mark) is False]
     if foreign:
-        raise Sdf2vecError(
-            f"{one_line(foreign[0])}: is there, and not made by sdf2vec; choose another -o, or replace it with --force"
-        )
+        raise _foreign(foreign[0], "-o")
+
+
+def _foreign(path: str, option: str) -> Sdf2vecError:
+    return Sdf2vecError(
+        f"{one_line(path)}: is there, and not made by sdf2vec; choose another {option}, or replace it with --force"
+    )
 
 
 def beside_of(path: str, suffix: str, ending: str) -> str:

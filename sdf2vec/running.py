@@ -61,6 +61,15 @@ class Running(Struct, frozen=True, kw_only=True):
             "FILE",
         ),
     ] = None
+    curve: Annotated[
+        tuple[str, ...],
+        plain(
+            "PSNR and FLIP of ever fewer of the shapes against their number and the exports' bytes: .csv, or a chart, "
+            ".png or .svg (pip install 'sdf2vec[bench]'); may be given several times",
+            "FILE",
+            several=True,
+        ),
+    ] = ()
     with_original: Annotated[bool, plain("a page also holds the picture and a slider to compare")] = False
     check: Annotated[
         str, choice("check", "draw each export on a quick engine that is here, to say how near it is", CHECKS)
@@ -73,6 +82,11 @@ def check_together(running: Running, given: Collection[str]) -> None:
     """Raises Sdf2vecError for what has no effect beside what else is given."""
     if running.quiet and running.verbose:
         raise Sdf2vecError("either -q or -v, not both")
+    if running.curve and (running.report is not None or running.skip_existing):
+        other = "--skip-existing" if running.skip_existing else "--report"
+        raise Sdf2vecError(
+            f"--curve is for one picture that is fitted, {other} for many: leave one of them out"
+        )
     if running.engine == PROCESSES and running.address is not None:
         raise Sdf2vecError("--address has no effect on processes; it is for --engine dask and ray")
     if running.engine == PROCESSES and "shard" in given and (running.jobs or 1) == 1:

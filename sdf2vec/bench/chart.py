@@ -10,6 +10,7 @@ from pathlib import Path
 import matplotlib as mpl
 from matplotlib.figure import Figure
 
+from ..export.exported import MARK
 from ..files import write_atomically
 
 Points = Sequence[tuple[float, float]]
@@ -44,9 +45,14 @@ def write(chart: Chart, path: Path) -> None:
 
 
 def save(figure: Figure, path: Path) -> None:
-    """Writes a figure as what its name's ending says; the same figure gives the same file."""
-    file, form = io.BytesIO(), path.suffix[1:]
-    metadata = {"Date": None, "Creator": None} if form == "svg" else {"Software": None}
+    """Writes a figure as what its name's ending says."""
+    write_atomically(path, encoded(figure, path.suffix[1:]))
+
+
+def encoded(figure: Figure, form: str) -> bytes:
+    """A figure as PNG or SVG; the same figure gives the same bytes."""
+    file = io.BytesIO()
+    metadata = {"Date": None, "Creator": MARK} if form == "svg" else {"Software": MARK}
     with mpl.rc_context({"svg.hashsalt": "sdf2vec", "svg.fonttype": "none"}):
         figure.savefig(file, format=form, metadata=metadata, dpi=110)
-    write_atomically(path, file.getvalue())
+    return file.getvalue()

@@ -252,6 +252,10 @@ def _command(options: argparse.Namespace) -> str:
     words = [f"--shapes {options.shapes}"] + [f"--tool {tool}" for tool in options.tool]
     plain = {name: getattr(options, name) for name in ("kind", "preset", "cuts")}
     words += [f"--{name} {value}" for name, value in plain.items() if value]
+    usual = {"counts": ",".join(map(str, COUNTS)), "modes": ",".join(MODES)}
+    words += [
+        f"--{name} {vars(options)[name]}" for name, value in usual.items() if vars(options)[name] != value
+    ]
     return f"python -m sdf2vec.bench.known {' '.join(words)} --seeds {options.seeds} -o {options.output.as_posix()}"
 
 

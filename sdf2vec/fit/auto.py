@@ -15,25 +15,25 @@ import numpy as np
 import torch
 from msgspec import structs
 
-from ..blend import COMPOSITING
 from ..image import Picture
 from ..paints import FLAT as ONE_COLOR
 from ..quality import psnr_of, quality
-from ..render import fused
-from ..render.tensors import SceneTensors, from_scene, to_scene
+from ..render.tensors import SceneTensors, to_scene
 from ..scene import Scene
 from ..threads import threads_of_its_own
 from .backends import CPU, choose
 from .byte_budget import SLOPE, Share, within
+from .digits import concise
 from .initialization import Layers, background_of, empty_groups
 from .joining import Search
 from .loop import Callback, Progress, Stopped, fit_picture
-from .matching_pursuit import Missing, Painted, find_discs
+from .matching_pursuit import Painted, find_discs
 from .offers import common_color
+from .one_more import gain_of_one_more
+from .ramps import grounded
 from .settings import AUTO, Settings, preset_of
 from .simplify import simplified
 from .sparse import FLOOR, Round, Sizes, error_of, finished, grow, needed, pruned
-from .surroundings import View
 from .views import scaled, view_of
 
 SEARCH, JOINT, LAST = 56, 128, 320  # pixels squared
@@ -79,23 +79,12 @@ def fitted_picture(
             found = _few(picture, settings, callback) or _painted(picture, settings, callback)
         else:
             found = _within(picture, settings, callback, share)
-        gain = gain_of_one_more(found.scene, view_of(picture.premultiplied, settings, JOINT))
+        layers = Layers(settings.drawn_kinds or settings.kinds, settings.compositing, 1, settings.paint)
+        search = Search(
+            layers, preset_of(settings).falloff, torch.Generator(), lambda loss: None, pixel_of(picture)
+        )
+        gain = gain_of_one_more(found.scene, view_of(picture.premultiplied, settings, JOINT), search)
         return replace(found, reason=f"{found.reason}; one more would gain {gain:.2f} dB")
-
-
-def gain_of_one_more(scene: Scene, view: View) -> float:
-    """What the best soft disc on top, or added, takes from the error of a scene's render, in dB."""
-    channels, height, width = view.target.shape
-    image = fused.composite(from_scene(scene), width, height, channels)
-    weights = torch.ones(height, width) if view.weights is None else view.weights
-    is_added = COMPOSITING[scene.compositing].signed
-    canvas = (
-        Missing(view.target - image, weights) if is_added else Painted(image.clone(), view.target, weights)
-    )
-    find_discs(canvas, 1)
-    left = canvas.residual if isinstance(canvas, Missing) else view.target - canvas.image
-    before, after = ((wrong * weights).square().mean() for wrong in (view.target - image, left))
-    return max(0.0, 10.0 * math.log10(float(before / after))) if after > 0 else 0.0
 
 
 def _within(picture: Picture, settings: Settings, callback: Callback, share: Share) -> Fitted:
@@ -128,9 +117,19 @@ def _few(picture: Picture, settings: Settings, callback: Callback) -> Fitted | N
             return None
         if drawing.error <= (drawing.floor if settings.target_psnr else GOOD):
             return Fitted(found, _counted(found))
-    painted = fit_picture(picture, _going_on(settings, found), callback)
+    painted = _fit(picture, _going_on(settings, found), callback)
     as_wanted = settings.shapes == AUTO or (settings.shapes == found.shape_count and settings.loss is None)
     return _told(_nearest([painted, *([found] if as_wanted else [])], picture), picture, settings)
+
+
+def _fit(picture: Picture, settings: Settings, callback: Callback) -> Scene:
+    """A fit of so many shapes, with no more digits than it needs."""
+    return concise(fit_picture(picture, settings, callback), picture, settings)
+
+
+def pixel_of(picture: Picture) -> float:
+    """Its side in scene units."""
+    return 1.0 / min(picture.width, picture.height)
 
 
 def _nearest(scenes: Sequence[Scene], picture: Picture) -> Scene:
@@ -193,7 +192,7 @@ class Drawing:
     def __init__(self, picture: Picture, settings: Settings, callback: Callback, flat: bool) -> None:
         self.picture, self.settings, self.callback, self.flat = picture, settings, callback, flat
         self.stopped, self.gave_up, self.error = False, False, math.inf
-        pixel = 1.0 / min(picture.width, picture.height)
+        pixel = pixel_of(picture)
         self.size = (picture.width * pixel, picture.height * pixel)
         target = settings.target_psnr
         self.floor = FLOOR if target is None else 10 ** (-target / 10)
@@ -207,6 +206,7 @@ class Drawing:
         """The scene, as simple as it may be."""
         try:
             self._announce_compiling()
+            self.scene = grounded(self.scene, self.sizes.joint, self.search)
             for made in grow(self.scene, self.sizes, self.search, self.settings.most, self.floor):
                 self.scene = made.scene
                 if self._is_no_drawing(made):
@@ -217,7 +217,7 @@ class Drawing:
         except Stopped:
             self.stopped = True
         self.error = error_of(self.scene, self.sizes.last)
-        return self._made()
+        return concise(self._made(), self.picture, self.settings)
 
     def _made(self) -> Scene:
         return to_scene(self.scene, self.picture.width, self.picture.height)
@@ -267,7 +267,7 @@ def ground_of(target: torch.Tensor) -> torch.Tensor:
 
 def _painted(picture: Picture, settings: Settings, callback: Callback) -> Fitted:
     """The fit of a picture that is no drawing."""
-    scene = fit_picture(picture, settings, callback)
+    scene = _fit(picture, settings, callback)
     if settings.shapes != AUTO:
         return Fitted(scene)
     if settings.target_psnr is None and settings.target_flip is None:
@@ -296,7 +296,7 @@ def _fewer(
         count = min(max(math.ceil(guess), low + 1), high - 1)
         if count <= low:
             return
-        tried = fit_picture(picture, structs.replace(settings, shapes=count), callback)
+        tried = _fit(picture, structs.replace(settings, shapes=count), callback)
         missed = _missed(tried, picture, settings)
         if missed <= 0:
             high, above = count, missed
@@ -326,4 +326,6 @@ def _counted(scene: Scene) -> str:
     kinds = Counter(shape.kind for layer in scene.layers for shape in layer.shapes)
     listed = ", ".join(f"{count} {kind}" for kind, count in kinds.most_common())
     shapes = "1 shape" if scene.shape_count == 1 else f"{scene.shape_count} shapes"
-    return shapes + (f" ({listed})" if listed else "")
+    layers = "1 layer" if len(scene.layers) == 1 else f"{len(scene.layers)} layers"
+    joined = f" in {layers}" if len(scene.layers) < scene.shape_count else ""
+    return shapes + joined + (f" ({listed})" if listed else "")

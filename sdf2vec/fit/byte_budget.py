@@ -13,11 +13,12 @@ from ..image import Picture
 from ..quality import psnr_of
 from ..render.tensors import SceneTensors, from_scene, to_scene
 from ..scene import Scene
+from .digits import concise
 from .initialization import background_of
 from .loop import Callback, fit_picture
 from .settings import Settings
-from .sparse import error_of, without
 from .surroundings import View
+from .thinning import lighter
 from .views import view_of
 
 Share = Callable[[Scene], float]  # of a size limit, above 1 for what is too large
@@ -49,6 +50,7 @@ def within(picture: Picture, settings: Settings, share: Share, callback: Callbac
     count = chosen.wanted
     for _ in range(FITS):
         scene = fit_picture(picture, structs.replace(chosen.settings, shapes=count), callback)
+        scene = concise(scene, picture, settings)
         taken = share(scene)
         each = (taken - empty) / count
         scene, taken = _trimmed(scene, view, share, each, taken)
@@ -81,6 +83,7 @@ def _probe(settings: Settings, picture: Picture, share: Share, callback: Callbac
     """What a fit of few shapes promises of one of as many as the limit can hold."""
     count = min(PROBED, settings.most)
     few = fit_picture(picture, structs.replace(settings, shapes=count, preset="fast"), callback)
+    few = concise(few, picture, settings)
     least, most = share(replace(few, layers=few.layers[:1])), share(few)
     each = max((most - least) / max(count - 1, 1), 1e-9)
     wanted = 1 + math.floor((1.0 - least) / each) if least <= 1 else 0
@@ -93,16 +96,7 @@ def _trimmed(scene: Scene, view: View, share: Share, each: float, taken: float) 
     tensors = from_scene(scene)
     while taken > 1.0 and tensors.layer_count:
         surplus = math.ceil((taken - 1.0) / each)
-        tensors = _lighter(tensors, view, min(max(surplus, 1), tensors.layer_count))
+        tensors = lighter(tensors, view, min(max(surplus, 1), tensors.layer_count))
         scene = to_scene(tensors, scene.width, scene.height)
         taken = share(scene)
     return scene, taken
-
-
-def _lighter(scene: SceneTensors, view: View, count: int) -> SceneTensors:
-    """The scene without so many layers: those without one of which it is least wrong."""
-    errors = [error_of(without(scene, order), view) for order in range(scene.layer_count)]
-    least = sorted(range(len(errors)), key=errors.__getitem__)[:count]
-    for order in sorted(least, reverse=True):
-        scene = without(scene, order)
-    return scene

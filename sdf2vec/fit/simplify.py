@@ -16,9 +16,10 @@ from ..expr import const
 from ..graph import scalarize
 from ..layer import LOOK, Part, Slot, slots
 from ..lower.torch import Tensors, compile_torch
+from ..paints import BASE, FLAT
 from ..render.tensors import Group, SceneTensors
 from ..shapes import KINDS
-from ..units import ANGLE
+from ..units import ANGLE, COLOR
 from .candidates import reductions
 from .joining import Search, inserted
 from .sparse import error_of
@@ -28,6 +29,8 @@ STEPS = 10  # of a changed layer
 RISE = 1.02  # of the error, at most, by one change
 UPRIGHT = 0.05  # radians off, at most, of what is tried upright
 NEARLY_OPAQUE = 0.3  # on one colour, opacity and colour may stand for each other
+UNSEEN = (0.25 / 255) ** 2  # by which the mean squared error may always rise: a quarter of a level
+CLOSE = 0.005  # squared distance of colours that may become one
 SOFTEST = 4.0  # pixels of falloff, at most, of what is tried sharp
 
 Change = tuple[Group, tuple[Slot, ...]]  # a layer, and what of it must stay
@@ -36,14 +39,44 @@ Propose = Callable[[Group, View], Iterator[Change]]
 
 def simplified(scene: SceneTensors, view: View, search: Search, worst: float) -> SceneTensors:
     """The scene with simpler layers, while its mean squared error hardly rises or stays below the worst."""
-    trial = Trial(view, search, max(worst, RISE * error_of(scene, view)))
+    error = error_of(scene, view)
+    trial = Trial(view, search, max(worst, RISE * error, error + UNSEEN))
     for order in range(scene.layer_count):
         kept: tuple[Slot, ...] = ()
         for change in CHANGES:
             while (made := trial.changed(scene, order, change, kept)) is not None:
                 scene, still = made
                 kept = (*kept, *still)
+    return _sharing(scene, trial)
+
+
+def _sharing(scene: SceneTensors, trial: Trial) -> SceneTensors:
+    """The scene with colours that are close to one of a layer below made the same, while it stays good enough."""
+    shared: list[torch.Tensor] = []
+    for order in range(scene.layer_count):
+        layer = layer_at(scene, order)
+        own = layer.of(BASE.name, 0)
+        close = sorted(
+            (color for color in shared if _distance(color, own) < CLOSE),
+            key=lambda color: _distance(color, own),
+        )
+        if close and layer.structure[0].paint == FLAT:
+            recolored = inserted(scene, _with_color(layer, close[0]))
+            if error_of(recolored, trial.view) <= trial.limit:
+                scene = recolored
+                continue
+        shared.append(own)
     return scene
+
+
+def _distance(one: torch.Tensor, other: torch.Tensor) -> float:
+    return float((one - other).square().sum())
+
+
+def _with_color(layer: Group, color: torch.Tensor) -> Group:
+    """The layer with another colour of its first shape."""
+    slot = Slot(0, BASE)
+    return Group(layer.structure, layer.order, {**layer.values, slot: color})
 
 
 @dataclass(frozen=True)
@@ -82,9 +115,12 @@ def _fewer_parts(layer: Group, view: View) -> Iterator[Change]:
 
 
 def _circle(layer: Group, view: View) -> Iterator[Change]:
-    """A shape as a circle of about its extent: what is mostly hidden may be any kind, and this has fewest numbers."""
+    """A shape as a circle of about its extent: what is mostly hidden may be any kind, and this has fewest numbers.
+
+    Not where a paint is stretched over it.
+    """
     for index, part in enumerate(layer.structure):
-        if part.kind != "circle" and KINDS[part.kind].patch is None:
+        if part.kind != "circle" and part.paint == FLAT and KINDS[part.kind].patch is None:
             center, radius = middle_of(layer, index)
             yield (
                 _with_part(layer, index, part._replace(kind="circle"), {"center": center, "radius": radius}),
@@ -115,6 +151,17 @@ def _with_part(layer: Group, index: int, part: Part, own: dict[str, torch.Tensor
     }
     values = {slot: new[slot] if slot in new else layer.values[slot] for slot in slots(structure)}
     return Group(structure, layer.order, values)
+
+
+def _flat(layer: Group, view: View) -> Iterator[Change]:
+    """A shape in one colour, the mean of those that it is painted with."""
+    for index, part in enumerate(layer.structure):
+        if part.adds and part.paint != FLAT:
+            colors = [
+                v for slot, v in layer.values.items() if slot.part == index and slot.parameter.unit is COLOR
+            ]
+            mean = torch.stack(colors).mean(0)
+            yield _with_part(layer, index, part._replace(paint=FLAT), {BASE.name: mean}), ()
 
 
 def _upright(layer: Group, view: View) -> Iterator[Change]:
@@ -151,7 +198,7 @@ def _opaque(layer: Group, view: View) -> Iterator[Change]:
 def _sharp(layer: Group, view: View) -> Iterator[Change]:
     slot = Slot(None, LOOK[1])
     pixel = 1.0 / min(view.target.shape[1:])
-    if float(layer.falloff) <= SOFTEST * pixel:
+    if float(layer.falloff) <= SOFTEST * pixel or layer.structure[0].paint != FLAT:
         yield _with(layer, slot, 0.0), (slot,)
 
 
@@ -173,6 +220,7 @@ def _with(layer: Group, changed: Slot, value: float) -> Group:
 CHANGES: tuple[Propose, ...] = (
     _fewer_parts,
     _circle,
+    _flat,
     _unrounded,
     _upright,
     _opaque,

@@ -22,6 +22,7 @@ from .constraints import enforce_min_thickness, project
 from .joining import Search, detached, faults_of, inserted
 from .offers import NEAR, Offer, instead_of, offers
 from .presets import Phase
+from .ramps import lowest
 from .surroundings import Surroundings, View, layer_at, some
 
 FLOOR = 10**-4.4  # mean squared error, 44 dB: below it nothing is missing
@@ -96,7 +97,7 @@ def _wrong(scene: SceneTensors, view: View) -> torch.Tensor:
 
 def _offers(scene: SceneTensors, view: View, search: Search, floor: float, greedy: bool) -> list[Offer]:
     """New layers, for the top of the scene or its bottom; the draw order is that of the scene without the others."""
-    orders = sorted({0, scene.layer_count})
+    orders = sorted({lowest(scene), scene.layer_count})
     around = {order: Surroundings.of(_opened(scene, order), order, view) for order in orders}
     return offers(around, search, floor, greedy)
 
@@ -110,7 +111,7 @@ def _opened(scene: SceneTensors, order: int) -> SceneTensors:
 def _with(scene: SceneTensors, found: list[Offer]) -> SceneTensors:
     """The scene with new layers."""
     for offer in found:
-        order = scene.layer_count if offer.order else 0
+        order = scene.layer_count if offer.order > lowest(scene) else lowest(scene)
         scene = inserted(_opened(scene, order), replace(offer.layer, order=torch.tensor([order])))
     return scene
 

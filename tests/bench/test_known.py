@@ -70,7 +70,9 @@ def test_the_command_writes_a_page_and_its_figure(require_engine, command, tmp_p
     output = tmp_path / "known.md"
     command("--tool", "truth", "--seeds", 2, "--counts", "0,2", "-o", output)
     text = output.read_text()
-    assert f"python -m sdf2vec.bench.known --shapes auto --tool truth --seeds 2 -o {output}" in text
+    assert (
+        f"python -m sdf2vec.bench.known --shapes auto --tool truth --counts 0,2 --seeds 2 -o {output}" in text
+    )
     rows = [line.split(" | ") for line in text.splitlines() if line.startswith("| **")]
     assert [(row[0], row[3], row[8], row[9]) for row in rows] == [
         ("| **apart**", "1.00", "1.000", "1.000"),

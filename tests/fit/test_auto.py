@@ -9,7 +9,10 @@ import torch
 
 from sdf2vec import Scene, Sdf2vecError, fit, fitted
 from sdf2vec.engines import resvg
-from sdf2vec.fit.auto import gain_of_one_more, ground_of, is_flat
+from sdf2vec.fit.auto import ground_of, is_flat
+from sdf2vec.fit.initialization import Layers
+from sdf2vec.fit.joining import Search
+from sdf2vec.fit.one_more import gain_of_one_more
 from sdf2vec.fit.settings import settings_of
 from sdf2vec.fit.surroundings import View
 from sdf2vec.image import Picture, resize
@@ -122,13 +125,23 @@ def test_a_search_says_when_kernels_are_compiled(drawn, monkeypatch):
     assert said == ["compiling kernels (once)"]
 
 
+def gain(scene, pixels):
+    """What one more circle would gain."""
+    search = Search(Layers(("circle",), "over"), (0.0, 1.0), torch.Generator(), lambda loss: None, 1 / 16)
+    return gain_of_one_more(scene, View(torch.from_numpy(pixels.transpose(2, 0, 1).copy()), None), search)
+
+
 def test_what_one_more_shape_would_gain_is_told():
     """Nothing where nothing is missing; much where one colour is missing everywhere."""
     pixels = np.full((16, 16, 3), 0.5, np.float32)
-    view = View(torch.from_numpy(pixels.transpose(2, 0, 1).copy()), None)
-    right = Scene(16, 16, (), (0.5, 0.5, 0.5))
-    assert gain_of_one_more(right, view) == 0.0
-    assert gain_of_one_more(Scene(16, 16, (), (0.4, 0.5, 0.5)), view) > 1.0
+    assert gain(Scene(16, 16, (), (0.5, 0.5, 0.5)), pixels) == 0.0
+    assert gain(Scene(16, 16, (), (0.4, 0.5, 0.5)), pixels) > 1.0
+
+
+def test_what_one_more_shape_would_gain_is_what_it_gains(drawn):
+    """A disc that is missing comes back whole: the gain is that of a circle, not of a blurred disc."""
+    picture = drawn(WHITE + DISC, 64, 64)
+    assert gain(Scene(64, 64, (), (1.0, 1.0, 1.0)), picture.pixels) > 20
 
 
 @pytest.mark.parametrize("seed", range(2))

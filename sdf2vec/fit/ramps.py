@@ -1,0 +1,122 @@
+"""A ground that runs from one colour to another: a box over all of the canvas, in the linear paint."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import torch
+
+from ..layer import Part, Slot, slots
+from ..paints import FLAT, PAINTS
+from ..render import fused
+from ..render.tensors import Group, SceneTensors
+from .joining import Search, inserted
+from .surroundings import Points, Surroundings, View, layer_at, points_of
+
+PAINT, KIND = "linear", "box"
+ROUNDS = 8  # of a plane through the pixels that are nearest to it
+NEAR = 4.0 / 255  # of the ramp, what is its own
+EXPLAINED = (
+    0.6  # least share of the variance that a plane takes away, where a ramp is tried though little is near it
+)
+SHARE, MORE = 0.3, 1.5  # least share of the canvas that is a ramp; and of what is one flat colour
+MARGIN = 0.1  # scene units by which the box is larger than the canvas
+LEAST_SLOPE = 0.02  # change of a colour across a scene unit
+STEPS, TRIMS = 10, 4
+
+
+class Plane(NamedTuple):
+    """A colour [C] at the middle, by how much it changes along x and y [2, C], and where the picture is near to it.
+
+    `explains`: the share of all variance that such a plane takes away.
+    """
+
+    middle: torch.Tensor
+    slopes: torch.Tensor
+    near: torch.Tensor  # [P]
+    explains: float
+
+
+def grounded(scene: SceneTensors, view: View, search: Search) -> SceneTensors:
+    """The bare scene on a ramp, where much of the picture is one that no flat colour explains as well."""
+    if KIND not in search.layers.kinds or len(view.target) != 3:
+        return scene
+    points = points_of(scene, view)
+    plane = _plane(view.target.flatten(1).T, points)
+    flat = _near(scene, view)
+    if plane.explains < EXPLAINED and plane.near.float().mean() < max(SHARE, MORE * flat):
+        return scene
+    ramp = _on_ramp(scene, plane, points, view, search)
+    is_one = plane.slopes.norm() > LEAST_SLOPE and _near(ramp, view) > max(SHARE, MORE * flat)
+    return ramp if is_one else scene
+
+
+def lowest(scene: SceneTensors) -> int:
+    """The lowest place in the draw order that is seen: above a ramp."""
+    return int(scene.layer_count > 0 and layer_at(scene, 0).structure[0].paint != FLAT)
+
+
+def _plane(colors: torch.Tensor, points: Points) -> Plane:
+    """The plane through as many colours [P, C] as can be: least squares of the nearest half, again and again."""
+    x, y, _ = points
+    rows = torch.stack([torch.ones_like(x), x, y], dim=1)
+    found = torch.linalg.lstsq(rows, colors).solution
+    explains = 1.0 - float((rows @ found - colors).square().sum() / (colors - colors.mean(0)).square().sum())
+    for _ in range(ROUNDS):
+        wrong = (rows @ found - colors).abs().amax(1)
+        chosen = wrong <= wrong.median().clamp_min(NEAR)
+        found = torch.linalg.lstsq(rows[chosen], colors[chosen]).solution
+    wrong = (rows @ found - colors).abs().amax(1)
+    near = wrong <= wrong.median().clamp_min(NEAR)
+    return Plane(found[0], found[1:], near, explains)
+
+
+def _near(scene: SceneTensors, view: View) -> float:
+    """The share of the pixels that are near to a scene's."""
+    return float((_wrong(scene, view) < NEAR).float().mean())
+
+
+@torch.no_grad()
+def _wrong(scene: SceneTensors, view: View) -> torch.Tensor:
+    """How far a scene is from the picture, the worst of its channels, [H, W]."""
+    channels, height, width = view.target.shape
+    return (fused.composite(scene, width, height, channels) - view.target).abs().amax(0)
+
+
+def _on_ramp(scene: SceneTensors, plane: Plane, points: Points, view: View, search: Search) -> SceneTensors:
+    """The scene with a box of two colours under everything, descended by its paint."""
+    left, strengths, right = torch.linalg.svd(plane.slopes, full_matrices=False)
+    axis, change = left[:, 0], strengths[0] * right[0]
+    along = (torch.stack(points[:2], dim=1) @ axis)[plane.near]
+    low, high = along.min(), along.max()
+    center = axis * (low + high) / 2
+    half = torch.tensor(scene.size) / 2 + center.abs() + MARGIN
+    ends = [(plane.middle + change * end)[None].clamp(0.0, 1.0) for end in (low, high)]
+    numbers = {
+        "color": ends[0],
+        "color_end": ends[1],
+        "direction": (axis * half / (high - low).clamp_min(1e-6))[None],
+        "center": center[None],
+        "half_size": half[None],
+        "opacity": torch.ones(1, 1),
+    }
+    structure = (Part(KIND, PAINT),)
+    values: dict[Slot, torch.Tensor] = {
+        slot: numbers.get(slot.parameter.name, torch.zeros(1, slot.parameter.width))
+        for slot in slots(structure)
+    }
+    layer = Group(structure, torch.tensor([0]), values)
+    mask = _nearest(inserted(scene, layer), view) if plane.explains < EXPLAINED else None
+    for _ in range(TRIMS):
+        around = Surroundings.of(scene, 0, View(view.target, mask))
+        layer = search.trained(
+            layer, around, STEPS, lambda slot: slot.parameter in PAINTS[PAINT].parameters
+        ).layer
+        mask = _nearest(inserted(scene, layer), view)  # what is far from it is of shapes that lie on it
+    return inserted(scene, layer)
+
+
+def _nearest(scene: SceneTensors, view: View) -> torch.Tensor:
+    """Where the picture is near to a scene, at least the nearest half, [H, W]."""
+    wrong = _wrong(scene, view)
+    return (wrong <= wrong.median().clamp_min(NEAR)).float()

@@ -1,0 +1,48 @@
+"""As few digits as a picture needs."""
+
+import numpy as np
+import pytest
+
+from sdf2vec import Scene, fit, render
+from sdf2vec.fit.digits import concise
+from sdf2vec.fit.settings import settings_of
+from sdf2vec.image import Picture
+from sdf2vec.scene import Layer, Shape
+from sdf2vec.scene_file import dumps, loads
+
+DISC = Layer(
+    (Shape.of("circle", (0.81234, 0.21357, 0.43213), center=(0.012347, -0.034561), radius=0.254321),)
+)
+SCENE = Scene(64, 48, (DISC,), (0.91234, 0.87654, 0.76543))
+
+
+def psnr(one, other):
+    return -10 * np.log10(float(np.square(one - other).mean()) + 1e-20)
+
+
+def digits(scene):
+    numbers = [*scene.layers[0].numbers, *scene.background]
+    return [len(repr(number).partition(".")[2]) for number in numbers if number % 1]
+
+
+@pytest.mark.parametrize("noise", [0.0, 0.05], ids=["exact", "far off"])
+def test_a_scene_has_the_digits_that_its_picture_needs(noise):
+    """Fewer where it is far from the picture anyway, which it comes as near to as before."""
+    pixels = render(SCENE) + np.float32(noise) * np.random.default_rng(0).standard_normal(
+        (48, 64, 3), np.float32
+    )
+    picture = Picture(np.ascontiguousarray(pixels.clip(0, 1)))
+    found = concise(SCENE, picture, settings_of(1))
+    assert max(digits(found)) <= (4 if noise else 5) < max(digits(SCENE))
+    if noise:
+        assert abs(psnr(render(found), picture.pixels) - psnr(render(SCENE), picture.pixels)) < 0.01
+    else:
+        assert psnr(render(found), render(SCENE)) > 68  # a tenth of a level
+    assert loads(dumps(found)) == found
+
+
+def test_a_palette_stays_what_it_is():
+    picture = Picture(np.random.default_rng(0).random((16, 16, 3), np.float32))
+    scene = fit(picture, 5, preset="fast", palette="#123456,#fedcba")
+    exact = {tuple(round(v / 255, 5) for v in color) for color in ((0x12, 0x34, 0x56), (0xFE, 0xDC, 0xBA))}
+    assert {color for layer in scene.layers for color in layer.colors} <= exact
