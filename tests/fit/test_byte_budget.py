@@ -3,8 +3,9 @@
 import numpy as np
 import pytest
 
-from sdf2vec import Sdf2vecError, fit, fitted, share_of
+from sdf2vec import Sdf2vecError, fitted, share_of
 from sdf2vec.image import Picture, resize
+from tests.scenes import random_scene
 
 
 def noise():
@@ -67,7 +68,7 @@ def test_a_number_that_was_told_stays():
 
 
 def test_the_share_is_that_of_the_largest_export():
-    scene = fit(noise(), 5, preset="fast", max_falloff=0.0)
+    scene = random_scene(("circle", "box"), layers=5, joins=())
     svg, text = (share_of([target], max_bytes=4000)(scene) for target in ("svg", "shadertoy"))
     assert share_of(["svg", "shadertoy"], max_bytes=4000)(scene) == max(svg, text)
     assert share_of(["svg"], max_bytes=2000)(scene) == 2 * svg
