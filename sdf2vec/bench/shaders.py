@@ -183,9 +183,18 @@ def main() -> None:
     """Entry point of `python -m sdf2vec.bench.shaders`."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("picture", type=Path)
-    parser.add_argument("-o", "--output", type=Path, required=True)
+    parser.add_argument(
+        "-o", "--output", type=Path, help="the whole page; without, rows of the table are printed"
+    )
+    parser.add_argument("--targets", nargs="+", choices=LAYOUTS, default=list(LAYOUTS))
+    parser.add_argument("--counts", nargs="+", type=int, default=COUNTS)
     options = parser.parse_args()
-    scenes = {count: api.fit(options.picture, count, preset="fast") for count in COUNTS}
+    scenes = {count: api.fit(options.picture, count, preset="fast") for count in options.counts}
+    if options.output is None:
+        for target in options.targets:
+            for row in rows(scenes, target):
+                print(row, flush=True)
+        return
     command = f"python -m sdf2vec.bench.shaders {options.picture} -o {options.output}"
     write_atomically(options.output, page(scenes, options.picture.stem, command).encode())
 

@@ -5,22 +5,27 @@ What a shape's formulas compute from its parameters alone (the cosine of an angl
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections import defaultdict
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
-from functools import cache
-from typing import NamedTuple
+from functools import cache, cached_property
+from typing import Any, NamedTuple
 
 import numpy as np
 
-from ..arrays import Float32Array, IntArray
+from ..arrays import Float32Array, Float64Array, IntArray
 from ..blend import COMPOSITING, JOINS
-from ..expr import Expr, component, const, constant, operation, select, var, vec3
+from ..deferred import deferred
+from ..expr import Expr, component, const, operation, select, var, vec3
 from ..graph import hoist, scalarize, substitute
 from ..layer import PIXEL, STILL, P, cover_of, shape_at
 from ..operation import VEC4, VECTOR
 from ..paints import FLAT, PAINTS
 from ..scene import Layer, Scene, Shape
 from ..shapes import KINDS
+
+from_numpy: Callable[..., Any] = deferred("torch", "from_numpy")
+compile_torch: Callable[..., Callable[..., Any]] = deferred("sdf2vec.lower.torch", "compile_torch")
 
 OPACITY, FALLOFF, COUNT, SMOOTHNESS, JOIN = range(
     5
@@ -154,9 +159,16 @@ def form_of(scene: Scene) -> Form:
 def records(scene: Scene, form: Form) -> Float32Array:
     """All records, [shapes, stride, 4]."""
     table = np.zeros((scene.shape_count, form.stride * 4), np.float32)
-    rows = (row for layer in scene.layers for row in _records(layer, form))
-    for place, row in enumerate(rows):
-        table[place, : len(row)] = row
+    heads = [row for layer in scene.layers for row in _heads(layer, form)]
+    table[:, : form.head] = np.array(heads).reshape(len(table), form.head)
+    members: dict[Variant, list[int]] = defaultdict(list)
+    shapes = [shape for layer in scene.layers for shape in layer.shapes]
+    for place, shape in enumerate(shapes):
+        members[variant_of(shape)].append(place)
+    for variant, places in members.items():
+        tabulated = _tabulated(variant)
+        own = tabulated.values([shapes[place] for place in places])
+        table[places, form.head : form.head + tabulated.width] = own
     return table.reshape(scene.shape_count, form.stride, 4)
 
 
@@ -165,13 +177,14 @@ def first_records(layers: Sequence[Layer]) -> IntArray:
     return np.cumsum([0, *(len(layer.shapes) for layer in layers)], dtype=np.int64)[:-1]
 
 
-def _records(layer: Layer, form: Form) -> Iterator[list[float]]:
+def _heads(layer: Layer, form: Form) -> Iterator[list[float]]:
+    """What the record of each shape of a layer begins with."""
     joints = [(0.0, 0), *((joint.smoothness, form.joins.index(joint.join)) for joint in layer.joints)]
     for shape, joint in zip(layer.shapes, joints, strict=True):
         row = [layer.opacity, layer.falloff]
         row += [len(layer.shapes), *joint] if form.joins else []
         row += [form.variants.index(variant_of(shape))] if len(form.variants) > 1 else []
-        yield [*row, *_tabulated(variant_of(shape)).values(shape)]
+        yield row
 
 
 def record_scalars(variant: Variant) -> list[Expr]:
@@ -193,11 +206,15 @@ class _Tabulated:
         places = iter(range(start, start + self.width))
         return substitute(self._symbolic, {part: _take(part, places) for part in self._parts})
 
-    def values(self, shape: Shape) -> list[float]:
-        """The numbers of a shape's record."""
-        numbers = (*shape.color, *shape.paint_parameters, *shape.parameters)
-        values = dict(zip(self._inputs, map(const, numbers), strict=True))
-        return [constant(substitute(scalar, values)) for scalar in self.scalars]
+    def values(self, shapes: Sequence[Shape]) -> Float64Array:
+        """The numbers of the records of some shapes, [shapes, width]."""
+        rows = np.array([(*s.color, *s.paint_parameters, *s.parameters) for s in shapes])
+        found = self._compiled(*from_numpy(np.ascontiguousarray(rows.T)))
+        return np.stack([np.broadcast_to(column.numpy(), len(shapes)) for column in found], axis=1)
+
+    @cached_property
+    def _compiled(self) -> Callable[..., Any]:
+        return compile_torch(self.scalars, self._inputs)
 
 
 @cache

@@ -168,22 +168,21 @@ def test_a_fitted_photo_on_a_page(target, engine, photo, require_engine):
 def test_the_default_shadertoy_of_256_shapes(photo, require_engine):
     """Readable, within the 64 KiB that hosts take, and what is drawn is the render."""
     require_engine("opengl")
-    made = shader(photo, "shadertoy", Options(title="coffee"))
+    made = shader(photo, "shadertoy", Options(title="coffee", framing="fit"))
     assert made.choice.layout == "readable"
     assert len(made.text.encode()) <= 65_536
     assert made.text.count("// 255 triangle") == 1
-    assert levels(shown(photo, "auto", 240, 135), rendered(photo, 240, 135)) <= 0.1
+    assert levels(shown(made, 240, 135), rendered(photo, 240, 135)) <= 0.1
 
 
 def test_the_packed_shadertoy_of_256_shapes(photo, require_engine):
     """Small, and within a level of the render on a full HD canvas (a part of which is looked at here)."""
     require_engine("opengl")
-    made = shader(photo, "shadertoy", Options(title="coffee", layout="packed"))
+    made = shader(photo, "shadertoy", Options(title="coffee", framing="fit", layout="packed"))
     assert len(made.text.encode()) <= 15_360  # 15 KiB
-    assert levels(shown(photo, "packed", 960, 540), rendered(photo, 960, 540)) <= 1.0
+    assert levels(shown(made, 480, 270), rendered(photo, 480, 270)) <= 1.0
 
 
-def shown(scene, layout, width, height):
-    made = shader(scene, "shadertoy", Options(title="coffee", framing="fit", layout=layout))
+def shown(made, width, height):
     uniforms = {"iResolution": (float(width), float(height), 1.0)}
     return opengl.render(SHADERTOY_HEAD + made.text + SHADERTOY_TAIL, width, height, uniforms)

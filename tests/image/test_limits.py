@@ -99,7 +99,7 @@ def means(pixels, factor):
     return colour if pixels.shape[2] == 3 else np.concatenate([colour, sums[1] / sums[2]], axis=2)
 
 
-PALETTED = Image.fromarray(noise(3)).quantize(16)
+PALETTED = Image.fromarray(noise(3)).quantize(16, method=Image.Quantize.FASTOCTREE)
 LARGE = {
     "grey": Image.fromarray(noise(1)),
     "grey and alpha": Image.fromarray(noise(2), "LA"),
