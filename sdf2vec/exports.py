@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import math
+from bisect import bisect_left
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
 from functools import cache, cached_property, partial
 from typing import TYPE_CHECKING
 
+import numpy as np
 from msgspec import structs
 
 from .declared import check_choice
@@ -16,11 +18,13 @@ from .export import EXPORTERS, Exporter
 from .export.byte_limit import ByteLimit
 from .export.exported import Exported
 from .export.options import PICTURE, Options
+from .export.rounding import COARSEST, FINEST, Rounded, Rounding
 from .grain import DENSE, GRAINS, USUAL, Grain
 from .scene import Scene
+from .steps import StepsOf
 
 if TYPE_CHECKING:
-    from .fit.surroundings import View
+    from .fit.settling import Views
     from .image import Picture
 
 FEW = 32  # sharp layers, of which plain elements with names are small enough
@@ -30,14 +34,18 @@ HARDLY, LITTLE = (
 )  # dB that a small drawing may lose of the picture; where none loses less, the finest
 ABOUT = 1.03  # of a size limit, that a drawing which is still to be fitted may seem to take
 
-_drawable: Callable[[Scene, Callable[[float], View], Grain], Scene] = deferred(
-    "sdf2vec.fit.drawable", "drawable"
-)
+WASTED = 0.15  # dB that rounded numbers may lose of the picture
+USUAL_NEAR = 44.0  # dB from the render, where nobody knows how near that is to a picture
+GAINED, GAINED_ALONE = 5.0, 2.0  # dB, about, that fitting again to a picture brings, and to the render
+STEP, COARSER = 1.0, 2.0  # dB between two tries of rounded numbers, upwards, and down to a size limit
+TRIES = 3
+DENSEST = 30.0  # dB from the render; more shapes so coarse say more of a picture than fewer finer ones
+
+_drawable: Callable[[Scene, Views, Grain], Scene] = deferred("sdf2vec.fit.drawable", "drawable")
 _rounded: Callable[[Scene, Grain], Scene] = deferred("sdf2vec.fit.drawable", "rounded")
-_views_of: Callable[[Picture], Callable[[float], View]] = deferred("sdf2vec.fit.drawable", "views_of")
-_views_of_render: Callable[[Scene], Callable[[float], View]] = deferred(
-    "sdf2vec.fit.drawable", "views_of_render"
-)
+_settled: Callable[[Scene, StepsOf, Views], Scene] = deferred("sdf2vec.fit.settling", "settled")
+_views_of: Callable[[Picture], Views] = deferred("sdf2vec.fit.settling", "views_of")
+_picture_of: Callable[[Scene], Picture] = deferred("sdf2vec.fit.conversion", "picture_of")
 _psnr_of: Callable[[Scene, Picture], float] = deferred("sdf2vec.quality", "psnr_of")
 _over_of: Callable[[Scene], tuple[Scene, float]] = deferred("sdf2vec.fit.conversion", "over_of")
 
@@ -50,11 +58,7 @@ class Exports:
 
     def __init__(self, scene: Scene, picture: Picture | None = None) -> None:
         self.scene, self.picture = scene, picture
-        self._drawn, self._views, self._near = (
-            cache(self._fit_small),
-            cache(self._views_of),
-            cache(self._psnr),
-        )
+        self._drawn, self._near = cache(self._fit_small), cache(self._psnr)
 
     def export(self, target: str, options: Options | None = None) -> Exported:
         """One export. Raises Sdf2vecError for an unknown target and for what the exporter can't do."""
@@ -76,7 +80,8 @@ class Exports:
         scene = self._over[0] if exporter.accepts(options).refusal(self.scene) else self.scene
         if exporter.draw and exporter.draws(scene, options):
             return exporter.draw(_rounded(scene, DENSE), options, DENSE)
-        return exporter.from_finest(scene, options)[-1]()
+        rounding = exporter.rounding(scene, options)
+        return rounding(DENSEST).write(scene)[0] if rounding else exporter.from_finest(scene, options)[-1]()
 
     @cached_property
     def _over(self) -> tuple[Scene, float]:
@@ -88,7 +93,7 @@ class Exports:
             small = self._near_enough(EXPORTERS["svg"], scene, Options(title=options.title, alt=options.alt))
             options = structs.replace(options, drawing=str(small.data) if small else "")
         if options.max_bytes is None:
-            return self._near_enough(exporter, scene, options) or exporter.from_finest(scene, options)[0]()
+            return next(self._unlimited(exporter, scene, options))
         limit, tried = ByteLimit.of(options.max_bytes), []
         for make in self._from_finest(exporter, scene, options, limit):
             tried.append(make())
@@ -98,6 +103,14 @@ class Exports:
         name, size = exporter.suffix[1:], limit.size(made.raw)
         much = f"{name}: {size:,} bytes at least, more than the limit of {limit}; fit fewer shapes, or --shapes auto"
         return replace(made, notes=(*made.notes, much), met=False)
+
+    def _unlimited(self, exporter: Exporter, scene: Scene, options: Options) -> Iterator[Exported]:
+        """What there is where no size is asked for, best first."""
+        if small := self._near_enough(exporter, scene, options):
+            yield small
+        if rounding := self._rounding(exporter, scene, options):
+            yield self._rounded_near(rounding, scene)
+        yield exporter.from_finest(scene, options)[0]()
 
     def _near_enough(self, exporter: Exporter, scene: Scene, options: Options) -> Exported | None:
         """The smallest drawing that loses hardly anything of the picture."""
@@ -124,7 +137,7 @@ class Exports:
         """What may keep to a size limit."""
         draw = exporter.draw if exporter.draw and exporter.draws(scene, options) else None
         if draw is None:
-            yield from exporter.from_finest(scene, options)
+            yield from self._coarser(exporter, scene, options, limit)
             return
 
         @cache
@@ -149,15 +162,82 @@ class Exports:
 
     def _fit_small(self, scene: Scene, grain: Grain) -> Scene:
         """The scene nearest to the picture that a drawing of this grain can say."""
-        return _drawable(scene, self._views(scene), grain)
+        return _drawable(scene, self._views, grain)
 
-    def _views_of(self, scene: Scene) -> Callable[[float], View]:
-        return _views_of(self.picture) if self.picture else _views_of_render(scene)
+    # --- rounded numbers ------------------------------------------------------------------------------------------
+
+    def _rounding(self, exporter: Exporter, scene: Scene, options: Options) -> Rounding | None:
+        """How an export of rounded numbers is made, where it may be one or can be nothing else."""
+        near = self.picture is not None and options.svg_fidelity == PICTURE
+        may = near or options.max_bytes is not None or not exporter.forms
+        return exporter.rounding(scene, options) if may else None
+
+    def _rounded_near(self, rounding: Rounding, scene: Scene) -> Exported:
+        """The smallest that loses hardly anything of the picture; where none is found, the nearest."""
+        aim, error = self._aim(scene), 10 ** (-self._near(scene) / 10)
+        allowed, best = error + self._allowed(scene), (math.inf, Exported(""))
+        for _ in range(TRIES):
+            made, near = self._fit_rounded(rounding(aim), scene)
+            best = min(best, (10 ** (-near / 10), made), key=lambda found: found[0])
+            if best[0] <= allowed or aim >= FINEST:
+                break
+            aim = min(aim + STEP, FINEST)
+        return best[1]
+
+    def _coarser(
+        self, exporter: Exporter, scene: Scene, options: Options, limit: ByteLimit
+    ) -> Iterator[Callable[[], Exported]]:
+        """What may keep to a size limit: all forms, then ever coarser numbers."""
+        if exporter.forms:
+            yield from exporter.from_finest(scene, options)
+        rounding = self._rounding(exporter, scene, options)
+        if rounding is None:
+            if not exporter.forms:
+                yield from exporter.from_finest(scene, options)
+            return
+        first = self._aim(scene)
+        aims = [*np.arange(first, COARSEST, -COARSER).tolist(), COARSEST]
+        begin = bisect_left(
+            aims, True, key=lambda aim: limit.share(rounding(aim).write(scene)[0].raw) <= ABOUT
+        )
+        for aim in aims[min(begin, len(aims) - 1) :]:
+            yield partial(self._fitted_to, rounding, scene, aim)
+
+    def _fitted_to(self, rounding: Rounding, scene: Scene, aim: float) -> Exported:
+        return self._fit_rounded(rounding(aim), scene)[0]
+
+    def _fit_rounded(self, rounded: Rounded, scene: Scene) -> tuple[Exported, float]:
+        """One export, of the numbers with which it is nearest to the picture, and how near that is in dB."""
+        made, found = rounded.write(_settled(scene, rounded.steps_of, self._views))
+        near = self._near(found)
+        lost = _lost(self._near(scene) - near) if self.picture else f"{near:.1f} dB from the render"
+        return replace(made, notes=(*made.notes, f"numbers rounded: {lost}")), near
+
+    def _aim(self, scene: Scene) -> float:
+        """How near numbers that are only rounded are to be to the render, in dB, before they are fitted."""
+        gained = GAINED if self.picture else GAINED_ALONE
+        aim = -10 * math.log10(max(self._allowed(scene), 1e-12)) - gained
+        return min(max(aim, COARSEST), FINEST)
+
+    def _allowed(self, scene: Scene) -> float:
+        """The mean squared error that rounding may add."""
+        if self.picture is None:
+            return float(10 ** (-USUAL_NEAR / 10))
+        return float(10 ** (-self._near(scene) / 10) * (10 ** (WASTED / 10) - 1))
+
+    # --- what is fitted to ----------------------------------------------------------------------------------------
+
+    @cached_property
+    def _shown(self) -> Picture:
+        return self.picture or _picture_of(self.scene)
+
+    @cached_property
+    def _views(self) -> Views:
+        return _views_of(self._shown)
 
     def _psnr(self, scene: Scene) -> float:
         """How near a scene is to the picture, in dB."""
-        assert self.picture is not None
-        return _psnr_of(scene, self.picture)
+        return _psnr_of(scene, self._shown)
 
 
 def _lost(decibels: float) -> str:

@@ -6,7 +6,7 @@ import base64
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from msgspec import structs
@@ -40,9 +40,17 @@ from .layouts import (
 )
 from .options import BUFFER, GLSL_VERSIONS, Options
 from .records import BELOW, COUNT, JOIN, OWN, Form, first_records, form_of, records, slot
+from .rounding import Rounding
 from .tiles import COARSEST, Tiles
 
-packed_text: Callable[..., Any] = deferred("sdf2vec.export.packed_text", "PackedText")  # needs torch
+if TYPE_CHECKING:
+    from .packing import Packed
+
+packed_text: Callable[..., Any] = deferred(
+    "sdf2vec.export.packed_text", "PackedText"
+)  # needs torch, as all below
+pack: Callable[[Scene, float], Packed] = deferred("sdf2vec.export.packing", "pack")
+packed_rounding: Callable[..., Any] = deferred("sdf2vec.export.packed_rounding", "PackedRounding")
 SEEN = var("{seen}", VEC4)  # where a template puts the colour that is seen
 MOST_READABLE = TEXT_LIMIT // 50  # shapes; none is said in so few bytes
 TEXTS = ("readable", "table", "packed")  # layouts that may take the fewest bytes
@@ -120,6 +128,24 @@ def forms(scene: Scene, options: Options, name: str, suffix: str) -> list[Callab
     return [finest] if target.host is EMBEDDED or options.layout == BUFFER else [finest, densest]
 
 
+def rounding(scene: Scene, options: Options, name: str, suffix: str) -> Rounding | None:
+    """The packed text of a scene that suits it, as coarse as it may be; None where it is not to be packed."""
+    target = TARGETS[name]
+    asked = options.layout == "packed" or (options.layout == "auto" and options.max_bytes is not None)
+    if not (asked and scene.layers and "packed" in _host(target, options).layouts):
+        return None
+    chosen = structs.replace(options, layout="packed")
+    slack = BREATH if _moves(target, options) else 0.0
+
+    def write(said: Scene, packed: Packed) -> Exported:
+        made = _shader(said, target, chosen, packed)
+        text = dense(made.text, renamed=target.host is PASTED) if options.max_bytes else made.text
+        return Exported(text, {}, (made.about,))
+
+    made: Rounding = packed_rounding(scene, slack, write)
+    return made
+
+
 def shader(scene: Scene, name: str, options: Options) -> Shader:
     """A scene as a shader: `name` is a key of TARGETS. Raises Sdf2vecError for a layout that the target can't hold.
 
@@ -146,10 +172,10 @@ def _buffered(target: Target, options: Options) -> tuple[Target, Options]:
     return replace(target, has_knobs=False, buffered=True), structs.replace(options, layout="auto")
 
 
-def _shader(scene: Scene, target: Target, options: Options) -> Shader:
+def _shader(scene: Scene, target: Target, options: Options, packed: Packed | None = None) -> Shader:
     slack = BREATH if _moves(target, options) else 0.0
     choice = choose(scene, options.layout, _host(target, options), slack)
-    job = _Job(scene, target, options, choice, slack)
+    job = _Job(scene, target, options, choice, slack, packed)
     parts = _BODIES[choice.layout if scene.layers else "readable"](job)
     data, error = parts.pop("array", None), parts.pop("error", 0.0)
     text = template(target.template).render(
@@ -229,6 +255,7 @@ class _Job:
     options: Options
     choice: Choice
     slack: float
+    packed: Packed | None = None  # where it is, already
 
     @property
     def dialect(self) -> Dialect:
@@ -457,10 +484,11 @@ def _ivec4s(numbers: list[int]) -> list[str]:
 
 
 def _packed(job: _Job) -> dict[str, Any]:
-    text = packed_text(job.scene, job.slack, job.dialect, job.motion(var("float(i)")))
+    packed = job.packed or pack(job.scene, job.slack)
+    text = packed_text(packed, job.scene, job.dialect, job.motion(var("float(i)")))
     part = text.part() | {"coarsest": literal(COARSEST), "moving": bool(job.slack)}
     functions = job.functions([*text.roots, grid_point(P, P, P)])
-    return {"functions": functions, "packed": part, "error": text.packed.error}
+    return {"functions": functions, "packed": part, "error": packed.error}
 
 
 _BODIES = {"readable": _readable, "table": _table, "tiled": _tiled, "packed": _packed, "data": _data}
