@@ -37,7 +37,7 @@ ABOUT = 1.03  # of a size limit, that a drawing which is still to be fitted may 
 WASTED = 0.15  # dB that rounded numbers may lose of the picture
 USUAL_NEAR = 44.0  # dB from the render, where nobody knows how near that is to a picture
 GAINED, GAINED_ALONE = 5.0, 2.0  # dB, about, that fitting again to a picture brings, and to the render
-STEP, COARSER = 1.0, 2.0  # dB between two tries of rounded numbers, upwards, and down to a size limit
+STEP = 1.0  # dB between two tries of rounded numbers
 TRIES = 3
 DENSEST = 30.0  # dB from the render; more shapes so coarse say more of a picture than fewer finer ones
 
@@ -195,11 +195,9 @@ class Exports:
             if not exporter.forms:
                 yield from exporter.from_finest(scene, options)
             return
-        first = self._aim(scene)
-        aims = [*np.arange(first, COARSEST, -COARSER).tolist(), COARSEST]
-        begin = bisect_left(
-            aims, True, key=lambda aim: limit.share(rounding(aim).write(scene)[0].raw) <= ABOUT
-        )
+        first = FINEST if exporter.forms else self._aim(scene)
+        aims = [*np.arange(first, COARSEST, -STEP).tolist(), COARSEST]
+        begin = bisect_left(aims, True, key=lambda aim: limit.share(rounding(aim).write(scene)[0].raw) <= 1)
         for aim in aims[min(begin, len(aims) - 1) :]:
             yield partial(self._fitted_to, rounding, scene, aim)
 

@@ -30,7 +30,12 @@ class Steps(NamedTuple):
     def nearest(self, values: Any, unit: Unit) -> Any:
         """The numbers [G, width] at the steps nearest to some; tensors."""
         around = values % math.tau if unit is ANGLE else values
-        steps = ((unit.codec.root(around) - self.start) / self.width).round().clip(min=self.least).clip(max=self.most)
+        steps = (
+            ((unit.codec.root(around) - self.start) / self.width)
+            .round()
+            .clip(min=self.least)
+            .clip(max=self.most)
+        )
         return unit.codec.value(self.start + steps * self.width)
 
 

@@ -19,9 +19,7 @@ from .packing import Packed, Packer
 from .rounding import Bits, Chooser, Rounded
 
 ROOM = 0.01  # scene units that a fit may move edges by without other cells
-LOOKED_AT = dict(
-    zip(PRECISIONS, (1, 5, 5, 5), strict=True)
-)  # bits at first; of places, in falloffs
+LOOKED_AT = dict(zip(PRECISIONS, (1, 5, 5, 5), strict=True))  # bits at first; of places, in falloffs
 LEAST = dict(zip(PRECISIONS, (-4, 2, 2, 2), strict=True))
 MOST = dict(zip(PRECISIONS, (12, 16, 14, 14), strict=True))
 

@@ -53,7 +53,8 @@ pack: Callable[[Scene, float], Packed] = deferred("sdf2vec.export.packing", "pac
 packed_rounding: Callable[..., Any] = deferred("sdf2vec.export.packed_rounding", "PackedRounding")
 SEEN = var("{seen}", VEC4)  # where a template puts the colour that is seen
 MOST_READABLE = TEXT_LIMIT // 50  # shapes; none is said in so few bytes
-TEXTS = ("readable", "table", "packed")  # layouts that may take the fewest bytes
+TEXTS = ("readable", "table", "packed")  # layouts that may take few bytes
+DENSE = "without comments, names and spaces"
 DATA_WIDTH = 256  # texels in a row of a data texture
 
 
@@ -113,34 +114,43 @@ def exported(scene: Scene, options: Options, name: str, suffix: str) -> Exported
 
 
 def forms(scene: Scene, options: Options, name: str, suffix: str) -> list[Callable[[], Exported]]:
-    """The same, and the layout that takes the fewest bytes, as dense as can be."""
-    target = TARGETS[name]
+    """The same, and the layout that takes the fewest bytes, as dense as can be; those without `rounding`."""
+    target, rounded = TARGETS[name], _may_be_rounded(scene, options, name)
     layouts = [layout for layout in TEXTS if layout in _host(target, options).layouts]
     asked = layouts if options.layout == "auto" else [options.layout]
+    tried = [layout for layout in asked if not (rounded and layout == "packed")]
 
     def densest() -> Exported:
-        made = (shader(scene, name, structs.replace(options, layout=layout)) for layout in asked)
+        made = (shader(scene, name, structs.replace(options, layout=layout)) for layout in tried)
         texts = [(dense(one.text, renamed=target.host is PASTED), one) for one in made]
         text, best = min(texts, key=lambda found: len(found[0].encode()))
-        return Exported(text, {}, (f"{best.about}; without comments, names and spaces",), best.error)
+        return Exported(text, {}, (f"{best.about}; {DENSE}",), best.error)
 
     finest = partial(exported, scene, options, name, suffix)
+    if not tried:
+        return []
     return [finest] if target.host is EMBEDDED or options.layout == BUFFER else [finest, densest]
+
+
+def _may_be_rounded(scene: Scene, options: Options, name: str) -> bool:
+    """Whether a size limit may be kept to by coarser numbers."""
+    asked = options.layout == "packed" or options.layout == "auto"
+    can = asked and scene.layers and "packed" in _host(TARGETS[name], options).layouts
+    return bool(can) and options.max_bytes is not None
 
 
 def rounding(scene: Scene, options: Options, name: str, suffix: str) -> Rounding | None:
     """The packed text of a scene that suits it, as coarse as it may be; None where it is not to be packed."""
     target = TARGETS[name]
-    asked = options.layout == "packed" or (options.layout == "auto" and options.max_bytes is not None)
-    if not (asked and scene.layers and "packed" in _host(target, options).layouts):
+    if not (scene.layers and (options.layout == "packed" or _may_be_rounded(scene, options, name))):
         return None
     chosen = structs.replace(options, layout="packed")
     slack = BREATH if _moves(target, options) else 0.0
 
     def write(said: Scene, packed: Packed) -> Exported:
         made = _shader(said, target, chosen, packed)
-        text = dense(made.text, renamed=target.host is PASTED) if options.max_bytes else made.text
-        return Exported(text, {}, (made.about,))
+        text = dense(made.text, renamed=target.host is PASTED)
+        return Exported(text, {}, (f"{made.about}; {DENSE}",))
 
     made: Rounding = packed_rounding(scene, slack, write)
     return made
