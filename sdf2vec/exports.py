@@ -32,6 +32,7 @@ HARDLY, LITTLE = (
     0.2,
     0.5,
 )  # dB that a small drawing may lose of the picture; where none loses less, the finest
+LARGER = 0.7  # of a size limit: where the finest small drawing takes more, others take too much
 ABOUT = 1.03  # of a size limit, that a drawing which is still to be fitted may seem to take
 
 WASTED = 0.15  # dB that rounded numbers may lose of the picture
@@ -78,8 +79,8 @@ class Exports:
         """The form of one export that says most with few bytes, about: its numbers are rounded, not fitted again."""
         exporter = EXPORTERS[target]
         scene = self._over[0] if exporter.accepts(options).refusal(self.scene) else self.scene
-        if exporter.draw and exporter.draws(scene, options):
-            return exporter.draw(_rounded(scene, DENSE), options, DENSE)
+        if exporter.sketch and exporter.draws(scene, options):
+            return exporter.sketch(_rounded(scene, DENSE), options, DENSE)
         rounding = exporter.rounding(scene, options)
         return rounding(DENSEST).write(scene)[0] if rounding else exporter.from_finest(scene, options)[-1]()
 
@@ -119,17 +120,21 @@ class Exports:
             return None
         if len(scene.layers) <= FEW and not any(layer.falloff for layer in scene.layers):
             return None  # plain elements, with names
-        near = self._near(scene)
         for grain in USUAL:
-            drawn = self._drawn(scene, grain)
+            drawn, most = self._drawn(scene, grain), LITTLE if grain is USUAL[-1] else HARDLY
+            if self._lost_by(scene, drawn) > most:
+                continue
             made = exporter.draw(drawn, options, grain)
-            wrong = 10 ** (-self._near(drawn) / 10) + (made.error / 255) ** 2
-            lost = near + 10 * math.log10(max(wrong, 1e-12))
-            if lost <= (LITTLE if grain is USUAL[-1] else HARDLY):
+            lost = self._lost_by(scene, drawn, (made.error / 255) ** 2)
+            if lost <= most:
                 return replace(
                     made, notes=(f"{exporter.suffix[1:]}: drawn small, {_lost(lost)}", *made.notes)
                 )
         return None
+
+    def _lost_by(self, scene: Scene, found: Scene, error: float = 0.0) -> float:
+        """How many dB of the picture another scene loses whose mean squared error is larger by so much."""
+        return self._near(scene) + 10 * math.log10(max(10 ** (-self._near(found) / 10) + error, 1e-12))
 
     def _from_finest(
         self, exporter: Exporter, scene: Scene, options: Options, limit: ByteLimit
@@ -141,13 +146,17 @@ class Exports:
             return
 
         @cache
+        def share_of(grain: Grain) -> float:
+            assert exporter.sketch is not None
+            return limit.share(exporter.sketch(_rounded(scene, grain), options, grain).raw)
+
         def may_fit(grain: Grain) -> bool:
-            return limit.share(draw(_rounded(scene, grain), options, grain).raw) <= ABOUT
+            return share_of(grain) <= ABOUT
 
         near = self._near_enough(exporter, scene, options) if may_fit(USUAL[0]) else None
         if near:
             yield lambda: near
-        else:
+        elif share_of(GRAINS[0]) <= LARGER:
             yield from exporter.from_finest(scene, options)
         for grain in GRAINS:
             if grain is GRAINS[-1] or may_fit(grain):
