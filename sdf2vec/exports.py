@@ -183,15 +183,15 @@ class Exports:
 
     def _rounded_near(self, rounding: Rounding, scene: Scene) -> Exported:
         """The smallest that loses hardly anything of the picture; where none is found, the nearest."""
-        aim, error = self._aim(scene), 10 ** (-self._near(scene) / 10)
-        allowed, best = error + self._allowed(scene), (math.inf, Exported(""))
+        aim = self._aim(scene)
+        enough = -10 * math.log10(max(10 ** (-self._near(scene) / 10) + self._allowed(scene), 1e-12))
+        best = (Exported(""), -math.inf)
         for _ in range(TRIES):
-            made, near = self._fit_rounded(rounding(aim), scene)
-            best = min(best, (10 ** (-near / 10), made), key=lambda found: found[0])
-            if best[0] <= allowed or aim >= FINEST:
+            best = max(best, self._fit_rounded(rounding(aim), scene, enough), key=lambda found: found[1])
+            if best[1] >= enough or aim >= FINEST:
                 break
             aim = min(aim + STEP, FINEST)
-        return best[1]
+        return best[0]
 
     def _coarser(
         self, exporter: Exporter, scene: Scene, options: Options, limit: ByteLimit
@@ -213,10 +213,17 @@ class Exports:
     def _fitted_to(self, rounding: Rounding, scene: Scene, aim: float) -> Exported:
         return self._fit_rounded(rounding(aim), scene)[0]
 
-    def _fit_rounded(self, rounded: Rounded, scene: Scene) -> tuple[Exported, float]:
-        """One export, of the numbers with which it is nearest to the picture, and how near that is in dB."""
-        made, found = rounded.write(_settled(scene, rounded.steps_of, self._views))
+    def _fit_rounded(
+        self, rounded: Rounded, scene: Scene, enough: float = math.inf
+    ) -> tuple[Exported, float]:
+        """One export, of the numbers with which it is nearest to the picture, and how near that is in dB; they are
+        not fitted where rounding them is `enough`.
+        """
+        made, found = rounded.write(scene)
         near = self._near(found)
+        if near < enough:
+            again, found = rounded.write(_settled(scene, rounded.steps_of, self._views))
+            made, near = max((made, near), (again, self._near(found)), key=lambda tried: tried[1])
         lost = _lost(self._near(scene) - near) if self.picture else f"{near:.1f} dB from the render"
         return replace(made, notes=(*made.notes, f"numbers rounded: {lost}")), near
 
