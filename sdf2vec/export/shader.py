@@ -23,7 +23,7 @@ from ..operation import VEC2, VEC4
 from ..paints import FLAT
 from ..scene import MAX_SHAPES, Layer, Scene
 from ..templating import template
-from .dense_text import dense
+from .dense_text import brief, dense
 from .exported import Exported
 from .knobs import BREATH, GROUND, breath, dragged, knobs_of, turned
 from .layouts import (
@@ -203,7 +203,7 @@ def _shader(scene: Scene, target: Target, options: Options, packed: Packed | Non
         place=expression(surface_point(var(target.surface, VEC2), _size(scene)), target.dialect),
         **(dict.fromkeys(("table", "packed", "tiles", "data")) | {"layers": []} | parts),
     )
-    said = _dense(text) if choice.layout == "packed" else text
+    said = brief(text) if choice.layout == "packed" else text
     return Shader(said, choice, data, error, target.buffered)
 
 
@@ -218,12 +218,6 @@ def statements_of(scene: Scene, name: str, options: Options, first: int = 0) -> 
 def statements_text(layers: Iterable[tuple[str, list[str]]]) -> str:
     """The lines of a text that say the layers."""
     return template("layers.jinja").render(layers=list(layers))
-
-
-def _dense(text: str) -> str:
-    """Half as much indentation, no empty lines."""
-    lines = (line for line in text.splitlines() if line)
-    return "".join(f"{' ' * ((len(line) - len(line.lstrip())) // 2)}{line.lstrip()}\n" for line in lines)
 
 
 def files_beside(made: Shader, suffix: str) -> dict[str, bytes]:
