@@ -43,7 +43,7 @@ round_trips: Callable[..., list[Check]] = deferred("sdf2vec.roundtrip", "check")
 legend: Callable[[], str] = deferred("sdf2vec.roundtrip", "legend")
 escape: Callable[[str], str] = deferred("rich.markup", "escape")
 
-SET_HERE = ("alone", "near", "original", "drawing")  # options of exports that have no flag
+SET_HERE = ("alone", "original", "drawing")  # options of exports that have no flag
 OF_FITS = (
     "with_original",
     "recursive",

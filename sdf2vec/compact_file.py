@@ -56,28 +56,34 @@ class Scale(NamedTuple):
     def most(self) -> int:
         return (1 << self.bits) - 1
 
+    @property
+    def ends(self) -> tuple[float, float]:
+        """The roots of the first step and the last."""
+        return self.low / THOUSANDTHS, self.high / THOUSANDTHS
+
     def step(self, value: Any, unit: Unit) -> Any:
         """Where a value, or many, lies among the steps; not rounded."""
         value = value % math.tau if unit is ANGLE else value
-        return unit.codec.step(value, self.low / THOUSANDTHS, self.high / THOUSANDTHS, self.most)
+        return unit.codec.step(value, *self.ends, self.most)
 
     def value(self, step: Any, unit: Unit) -> Any:
         """What a step says."""
-        return unit.codec.said(step, self.low / THOUSANDTHS, self.high / THOUSANDTHS, self.most)
+        return unit.codec.said(step, *self.ends, self.most)
 
 
 Scales = Mapping[str, Scale]  # by the name of a unit
 
 
 @dataclass(frozen=True)
-class Steps:
-    """How the numbers of a scene are written: its sorts of shapes, and a scale for each unit."""
+class Numbering:
+    """How the numbers of a scene are written: its sorts of shapes, a scale for each unit, and the bits of steps."""
 
     parts: tuple[Part, ...]
     scales: Scales
+    bits: Bits
 
     @classmethod
-    def of(cls, scene: Scene, bits: Bits) -> Steps:
+    def of(cls, scene: Scene, bits: Bits) -> Numbering:
         """Scales that reach from the least to the largest number of the scene."""
         found: dict[str, list[float]] = defaultdict(list)
         parts: dict[Part, None] = {}
@@ -89,7 +95,7 @@ class Steps:
                 if is_said(slot, layer.structure):
                     found[slot.parameter.unit.name] += values
         units = units_of(parts)
-        return cls(tuple(parts), {u.name: _scale(u, found[u.name], bits) for u in units})
+        return cls(tuple(parts), {u.name: _scale(u, found[u.name], bits) for u in units}, bits)
 
 
 def _scale(unit: Unit, values: Iterable[float], bits: Bits) -> Scale:
@@ -121,7 +127,7 @@ def is_said(slot: Slot, structure: Structure) -> bool:
 class _Layers:
     """The numbers of layers one after another, with what is known of those before."""
 
-    def __init__(self, coder: Coder, steps: Steps) -> None:
+    def __init__(self, coder: Coder, steps: Numbering) -> None:
         self.coder, self.steps = coder, steps
         self.index_bits = (len(steps.parts) - 1).bit_length()
         self.joins = any(part.join for part in steps.parts)
@@ -175,7 +181,12 @@ class _Layers:
 
 def written(scene: Scene, bits: Bits) -> bytes:
     """A scene as a file, its numbers in steps of so many bits. Raises SceneError for what no file can say."""
-    coder, steps = Writer(), Steps.of(scene, bits)
+    return encoded(scene, Numbering.of(scene, bits))
+
+
+def encoded(scene: Scene, steps: Numbering) -> bytes:
+    """The same in steps that may be those of another scene of the same sorts of shapes."""
+    coder = Writer()
     _head(coder, scene)
     if len(steps.parts) > MOST_PARTS:
         raise SceneError("layers", f"more than {MOST_PARTS} sorts of shapes")
@@ -184,7 +195,7 @@ def written(scene: Scene, bits: Bits) -> bytes:
         for name, usual in zip(part, (None, FLAT, None), strict=True):
             _word(coder, "" if name == usual else name)
     for name in PRECISIONS:
-        coder.raw(bits[name], BITS_OF_BITS)
+        coder.raw(steps.bits[name], BITS_OF_BITS)
     for scale in steps.scales.values():
         coder.signed(scale.low)
         coder.count(scale.high - scale.low)
@@ -258,7 +269,7 @@ def _read(coder: Coder) -> Scene:
         raise SceneError("bits", f"must be 1 to {MOST_BITS}, got {list(bits.values())}")
     scales = {unit.name: _read_scale(coder, bits[unit.codec.precision]) for unit in units_of(parts)}
     count = _counted(coder, MAX_SHAPES if parts else 0, "layers")
-    layers = _Layers(coder, Steps(parts, scales))
+    layers = _Layers(coder, Numbering(parts, scales, bits))
     found: list[Layer] = []
     shapes = 0
     for index in range(count):

@@ -94,7 +94,7 @@ def convert(job: Job, work: Work, teller: Teller, stop: Stop) -> Done:
     if is_lettering(picture.pixels):
         teller.say(f"  {HINT}")
     original = _original(data(), picture) if work.running.with_original else None
-    export = replace(work.export, original=original, near=quality.psnr)
+    export = replace(work.export, original=original)
     written = write_exports(scene, job, export, teller, picture)
     checkpoint.remove()
     if job.curves and not stop.requested:

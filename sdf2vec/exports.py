@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import math
+from bisect import bisect_left
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
 from functools import cache, cached_property, partial
 from typing import TYPE_CHECKING
 
+import numpy as np
 from msgspec import structs
 
 from .declared import check_choice
@@ -16,11 +18,13 @@ from .export import EXPORTERS, Exporter
 from .export.byte_limit import ByteLimit
 from .export.exported import Exported
 from .export.options import PICTURE, Options
+from .export.rounding import COARSEST, FINEST, Rounded, Rounding
 from .grain import DENSE, GRAINS, USUAL, Grain
 from .scene import Scene
+from .steps import StepsOf
 
 if TYPE_CHECKING:
-    from .fit.surroundings import View
+    from .fit.settling import Views
     from .image import Picture
 
 FEW = 32  # sharp layers, of which plain elements with names are small enough
@@ -28,16 +32,21 @@ HARDLY, LITTLE = (
     0.2,
     0.5,
 )  # dB that a small drawing may lose of the picture; where none loses less, the finest
+LARGER = 0.7  # of a size limit: where the finest small drawing takes more, others take too much
 ABOUT = 1.03  # of a size limit, that a drawing which is still to be fitted may seem to take
 
-_drawable: Callable[[Scene, Callable[[float], View], Grain], Scene] = deferred(
-    "sdf2vec.fit.drawable", "drawable"
-)
+WASTED = 0.15  # dB that rounded numbers may lose of the picture
+USUAL_NEAR = 44.0  # dB from the render, where nobody knows how near that is to a picture
+GAINED, GAINED_ALONE = 5.0, 2.0  # dB, about, that fitting again to a picture brings, and to the render
+STEP = 1.0  # dB between two tries of rounded numbers
+TRIES = 3
+DENSEST = 30.0  # dB from the render; more shapes so coarse say more of a picture than fewer finer ones
+
+_drawable: Callable[[Scene, Views, Grain], Scene] = deferred("sdf2vec.fit.drawable", "drawable")
 _rounded: Callable[[Scene, Grain], Scene] = deferred("sdf2vec.fit.drawable", "rounded")
-_views_of: Callable[[Picture], Callable[[float], View]] = deferred("sdf2vec.fit.drawable", "views_of")
-_views_of_render: Callable[[Scene], Callable[[float], View]] = deferred(
-    "sdf2vec.fit.drawable", "views_of_render"
-)
+_settled: Callable[[Scene, StepsOf, Views], Scene] = deferred("sdf2vec.fit.settling", "settled")
+_views_of: Callable[[Picture], Views] = deferred("sdf2vec.fit.settling", "views_of")
+_picture_of: Callable[[Scene], Picture] = deferred("sdf2vec.fit.conversion", "picture_of")
 _psnr_of: Callable[[Scene, Picture], float] = deferred("sdf2vec.quality", "psnr_of")
 _over_of: Callable[[Scene], tuple[Scene, float]] = deferred("sdf2vec.fit.conversion", "over_of")
 
@@ -50,11 +59,7 @@ class Exports:
 
     def __init__(self, scene: Scene, picture: Picture | None = None) -> None:
         self.scene, self.picture = scene, picture
-        self._drawn, self._views, self._near = (
-            cache(self._fit_small),
-            cache(self._views_of),
-            cache(self._psnr),
-        )
+        self._drawn, self._near = cache(self._fit_small), cache(self._psnr)
 
     def export(self, target: str, options: Options | None = None) -> Exported:
         """One export. Raises Sdf2vecError for an unknown target and for what the exporter can't do."""
@@ -74,19 +79,22 @@ class Exports:
         """The form of one export that says most with few bytes, about: its numbers are rounded, not fitted again."""
         exporter = EXPORTERS[target]
         scene = self._over[0] if exporter.accepts(options).refusal(self.scene) else self.scene
-        if exporter.draw and exporter.draws(scene, options):
-            return exporter.draw(_rounded(scene, DENSE), options, DENSE)
-        return exporter.from_finest(scene, options)[-1]()
+        if exporter.sketch and exporter.draws(scene, options):
+            return exporter.sketch(_rounded(scene, DENSE), options, DENSE)
+        rounding = exporter.rounding(scene, options)
+        return rounding(DENSEST).write(scene)[0] if rounding else exporter.from_finest(scene, options)[-1]()
 
     def sketched(self, target: str, options: Options) -> Exported:
-        """One export, about as large as it would be: a small drawing's numbers are rounded, not fitted again."""
+        """One export, about as large as it would be: its numbers are rounded, not fitted again."""
         if options.max_bytes is not None:
             return self.densest(target, options)
         exporter = EXPORTERS[target]
         scene = self._over[0] if exporter.accepts(options).refusal(self.scene) else self.scene
         is_small = options.svg_fidelity == PICTURE and not _is_plain(scene)
-        if exporter.draw and is_small and exporter.draws(scene, options):
-            return exporter.draw(_rounded(scene, USUAL[0]), options, USUAL[0])
+        if exporter.sketch and is_small and exporter.draws(scene, options):
+            return exporter.sketch(_rounded(scene, USUAL[0]), options, USUAL[0])
+        if rounding := self._rounding(exporter, scene, options):
+            return rounding(self._aim(scene)).write(scene)[0]
         return exporter.from_finest(scene, options)[0]()
 
     @cached_property
@@ -99,7 +107,7 @@ class Exports:
             small = self._near_enough(EXPORTERS["svg"], scene, Options(title=options.title, alt=options.alt))
             options = structs.replace(options, drawing=str(small.data) if small else "")
         if options.max_bytes is None:
-            return self._near_enough(exporter, scene, options) or exporter.from_finest(scene, options)[0]()
+            return next(self._unlimited(exporter, scene, options))
         limit, tried = ByteLimit.of(options.max_bytes), []
         for make in self._from_finest(exporter, scene, options, limit):
             tried.append(make())
@@ -110,6 +118,14 @@ class Exports:
         much = f"{name}: {size:,} bytes at least, more than the limit of {limit}; fit fewer shapes, or --shapes auto"
         return replace(made, notes=(*made.notes, much), met=False)
 
+    def _unlimited(self, exporter: Exporter, scene: Scene, options: Options) -> Iterator[Exported]:
+        """What there is where no size is asked for, best first."""
+        if small := self._near_enough(exporter, scene, options):
+            yield small
+        if rounding := self._rounding(exporter, scene, options):
+            yield self._rounded_near(rounding, scene)
+        yield exporter.from_finest(scene, options)[0]()
+
     def _near_enough(self, exporter: Exporter, scene: Scene, options: Options) -> Exported | None:
         """The smallest drawing that loses hardly anything of the picture."""
         wanted = options.svg_fidelity == PICTURE and self.picture is not None
@@ -117,17 +133,21 @@ class Exports:
             return None
         if _is_plain(scene):
             return None
-        near = self._near(scene)
         for grain in USUAL:
-            drawn = self._drawn(scene, grain)
+            drawn, most = self._drawn(scene, grain), LITTLE if grain is USUAL[-1] else HARDLY
+            if self._lost_by(scene, drawn) > most:
+                continue
             made = exporter.draw(drawn, options, grain)
-            wrong = 10 ** (-self._near(drawn) / 10) + (made.error / 255) ** 2
-            lost = near + 10 * math.log10(max(wrong, 1e-12))
-            if lost <= (LITTLE if grain is USUAL[-1] else HARDLY):
+            lost = self._lost_by(scene, drawn, (made.error / 255) ** 2)
+            if lost <= most:
                 return replace(
                     made, notes=(f"{exporter.suffix[1:]}: drawn small, {_lost(lost)}", *made.notes)
                 )
         return None
+
+    def _lost_by(self, scene: Scene, found: Scene, error: float = 0.0) -> float:
+        """How many dB of the picture another scene loses whose mean squared error is larger by so much."""
+        return self._near(scene) + 10 * math.log10(max(10 ** (-self._near(found) / 10) + error, 1e-12))
 
     def _from_finest(
         self, exporter: Exporter, scene: Scene, options: Options, limit: ByteLimit
@@ -135,17 +155,21 @@ class Exports:
         """What may keep to a size limit."""
         draw = exporter.draw if exporter.draw and exporter.draws(scene, options) else None
         if draw is None:
-            yield from exporter.from_finest(scene, options)
+            yield from self._coarser(exporter, scene, options, limit)
             return
 
         @cache
+        def share_of(grain: Grain) -> float:
+            assert exporter.sketch is not None
+            return limit.share(exporter.sketch(_rounded(scene, grain), options, grain).raw)
+
         def may_fit(grain: Grain) -> bool:
-            return limit.share(draw(_rounded(scene, grain), options, grain).raw) <= ABOUT
+            return share_of(grain) <= ABOUT
 
         near = self._near_enough(exporter, scene, options) if may_fit(USUAL[0]) else None
         if near:
             yield lambda: near
-        else:
+        elif share_of(GRAINS[0]) <= LARGER:
             yield from exporter.from_finest(scene, options)
         for grain in GRAINS:
             if grain is GRAINS[-1] or may_fit(grain):
@@ -160,15 +184,87 @@ class Exports:
 
     def _fit_small(self, scene: Scene, grain: Grain) -> Scene:
         """The scene nearest to the picture that a drawing of this grain can say."""
-        return _drawable(scene, self._views(scene), grain)
+        return _drawable(scene, self._views, grain)
 
-    def _views_of(self, scene: Scene) -> Callable[[float], View]:
-        return _views_of(self.picture) if self.picture else _views_of_render(scene)
+    # --- rounded numbers ------------------------------------------------------------------------------------------
+
+    def _rounding(self, exporter: Exporter, scene: Scene, options: Options) -> Rounding | None:
+        """How an export of rounded numbers is made, where it may be one or can be nothing else."""
+        near = self.picture is not None and options.svg_fidelity == PICTURE
+        may = near or options.max_bytes is not None or not exporter.forms
+        return exporter.rounding(scene, options) if may else None
+
+    def _rounded_near(self, rounding: Rounding, scene: Scene) -> Exported:
+        """The smallest that loses hardly anything of the picture; where none is found, the nearest."""
+        aim = self._aim(scene)
+        enough = -10 * math.log10(max(10 ** (-self._near(scene) / 10) + self._allowed(scene), 1e-12))
+        best = (Exported(""), -math.inf)
+        for _ in range(TRIES):
+            best = max(best, self._fit_rounded(rounding(aim), scene, enough), key=lambda found: found[1])
+            if best[1] >= enough or aim >= FINEST:
+                break
+            aim = min(aim + STEP, FINEST)
+        return best[0]
+
+    def _coarser(
+        self, exporter: Exporter, scene: Scene, options: Options, limit: ByteLimit
+    ) -> Iterator[Callable[[], Exported]]:
+        """What may keep to a size limit: all forms, then ever coarser numbers."""
+        if exporter.forms:
+            yield from exporter.from_finest(scene, options)
+        rounding = self._rounding(exporter, scene, options)
+        if rounding is None:
+            if not exporter.forms:
+                yield from exporter.from_finest(scene, options)
+            return
+        first = FINEST if exporter.forms else self._aim(scene)
+        aims = [*np.arange(first, COARSEST, -STEP).tolist(), COARSEST]
+        begin = bisect_left(aims, True, key=lambda aim: limit.share(rounding(aim).write(scene)[0].raw) <= 1)
+        for aim in aims[min(begin, len(aims) - 1) :]:
+            yield partial(self._fitted_to, rounding, scene, aim)
+
+    def _fitted_to(self, rounding: Rounding, scene: Scene, aim: float) -> Exported:
+        return self._fit_rounded(rounding(aim), scene)[0]
+
+    def _fit_rounded(
+        self, rounded: Rounded, scene: Scene, enough: float = math.inf
+    ) -> tuple[Exported, float]:
+        """One export, of the numbers with which it is nearest to the picture, and how near that is in dB; they are
+        not fitted where rounding them is `enough`.
+        """
+        made, found = rounded.write(scene)
+        near = self._near(found)
+        if near < enough:
+            again, found = rounded.write(_settled(scene, rounded.steps_of, self._views))
+            made, near = max((made, near), (again, self._near(found)), key=lambda tried: tried[1])
+        lost = _lost(self._near(scene) - near) if self.picture else f"{near:.1f} dB from the render"
+        return replace(made, notes=(*made.notes, f"numbers rounded: {lost}")), near
+
+    def _aim(self, scene: Scene) -> float:
+        """How near numbers that are only rounded are to be to the render, in dB, before they are fitted."""
+        gained = GAINED if self.picture else GAINED_ALONE
+        aim = -10 * math.log10(max(self._allowed(scene), 1e-12)) - gained
+        return min(max(aim, COARSEST), FINEST)
+
+    def _allowed(self, scene: Scene) -> float:
+        """The mean squared error that rounding may add."""
+        if self.picture is None:
+            return float(10 ** (-USUAL_NEAR / 10))
+        return float(10 ** (-self._near(scene) / 10) * (10 ** (WASTED / 10) - 1))
+
+    # --- what is fitted to ----------------------------------------------------------------------------------------
+
+    @cached_property
+    def _shown(self) -> Picture:
+        return self.picture or _picture_of(self.scene)
+
+    @cached_property
+    def _views(self) -> Views:
+        return _views_of(self._shown)
 
     def _psnr(self, scene: Scene) -> float:
         """How near a scene is to the picture, in dB."""
-        assert self.picture is not None
-        return _psnr_of(scene, self.picture)
+        return _psnr_of(scene, self._shown)
 
 
 def _is_plain(scene: Scene) -> bool:

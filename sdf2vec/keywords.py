@@ -66,6 +66,5 @@ class ExportKeywords(TypedDict, total=False):
     title: str
     alt: str
     alone: bool
-    near: float | None
     drawing: str
     original: bytes | None

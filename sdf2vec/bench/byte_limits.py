@@ -46,7 +46,7 @@ def measured(path: Path, target: str, limit: int, **options: Any) -> Row:
     started = time.process_time()
     share = api.share_of([target], max_bytes=limit)
     scene = api.fitted(picture, share=share, **options).scene
-    made = api.exported(scene, target, max_bytes=limit)
+    made = api.exported(scene, target, picture=picture, max_bytes=limit)
     seconds = time.process_time() - started
     drawn = ROUND_TRIPS[target][0].draw(made, scene, picture.width, picture.height)
     near = psnr(drawn[..., :3], picture.pixels[..., :3])

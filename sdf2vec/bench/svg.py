@@ -25,7 +25,8 @@ from ..export.options import Options
 from ..export.svg import small_svg
 from ..exports import Exports
 from ..files import write_atomically
-from ..fit.drawable import drawable, views_of
+from ..fit.drawable import drawable
+from ..fit.settling import views_of
 from ..grain import GRAINS
 from ..image import Picture, load, premultiply
 from ..render.draw import draw

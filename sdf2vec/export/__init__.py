@@ -14,6 +14,7 @@ from ..scene import MAX_SHAPES, Scene
 from ..scene_file import FORMAT
 from .exported import MARK, Exported
 from .options import Accepts, Options
+from .rounding import Rounding
 
 
 @dataclass(frozen=True)
@@ -23,7 +24,9 @@ class Exporter:
     `accepts` says which scenes `write` takes, `most_shapes` how many shapes they may have; `heeds` names the options
     that matter to it; other files that it may write end in `beside`. `forms(scene, options)`, where there are several,
     begin with that of `write` and take ever fewer bytes; each is made when it is called. Where it `draws` a scene,
-    `draw` makes a small drawing of one whose numbers a grain can say (`fit.drawable`).
+    `draw` makes a small drawing of one whose numbers a grain can say (`fit.drawable`), `sketch` one of about that size,
+    quickly; where there is a `rounding` of a
+    scene, that says how coarse its numbers may be (`fit.settling`).
     `holds_drawing`: an SVG is in it. A file that ends in one of
     `endings` is taken to be for it; one that holds `mark` was made by it. `is_text`: it writes text, not bytes;
     `is_picture`: the render.
@@ -40,6 +43,8 @@ class Exporter:
     forms: Callable[[Scene, Options], Sequence[Callable[[], Exported]]] | None = None
     draws: Callable[[Scene, Options], bool] = lambda scene, options: False
     draw: Callable[[Scene, Options, Grain], Exported] | None = None
+    sketch: Callable[[Scene, Options, Grain], Exported] | None = None
+    rounding: Callable[[Scene, Options], Rounding | None] = lambda scene, options: None
     holds_drawing: bool = False
     is_text: bool = True
     is_picture: bool = False
@@ -73,7 +78,8 @@ def _shader(
     beside: tuple[str, ...] = (),
 ) -> Exporter:
     module = "sdf2vec.export.shader"
-    write, most_shapes, forms = (deferred(module, name) for name in ("exported", "most_shapes", "forms"))
+    names = ("exported", "most_shapes", "forms", "rounding")
+    write, most_shapes, forms, rounding = (deferred(module, name) for name in names)
     return Exporter(
         suffix,
         partial(write, name=name, suffix=suffix),
@@ -82,6 +88,7 @@ def _shader(
         other_endings=endings,
         beside=beside,
         forms=partial(forms, name=name, suffix=suffix),
+        rounding=partial(rounding, name=name, suffix=suffix),
         most_shapes=partial(most_shapes, name=name),
     )
 
@@ -90,9 +97,18 @@ def _svg(name: str, suffix: str, about: str, endings: tuple[str, ...] = ()) -> E
     module = "sdf2vec.export.svg"
     heeds = ("svg_profile", "svg_fidelity", "svg_size", "max_bytes", "title", "alt")
     accepts, forms = deferred(module, "accepts"), deferred(module, f"{name}_forms")
-    draws, draw = deferred(module, "draws"), deferred(module, f"small_{name}")
+    draws, draw, sketch = (deferred(module, name) for name in ("draws", f"small_{name}", f"sketch_{name}"))
     return Exporter(
-        suffix, deferred(module, name), about, accepts, heeds, endings, forms=forms, draws=draws, draw=draw
+        suffix,
+        deferred(module, name),
+        about,
+        accepts,
+        heeds,
+        endings,
+        forms=forms,
+        draws=draws,
+        draw=draw,
+        sketch=sketch,
     )
 
 
@@ -107,7 +123,7 @@ def _compact(
         heeds=("max_bytes",),
         other_endings=endings,
         mark=MAGIC,
-        forms=deferred(module, f"{name}_forms"),
+        rounding=deferred(module, f"{name}_rounding"),
         is_text=is_text,
     )
 

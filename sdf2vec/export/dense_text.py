@@ -73,3 +73,9 @@ def _short_names(tokens: list[str], text: str) -> dict[str, str]:
 
 def _names() -> Iterator[str]:
     return chain(ascii_letters, map("".join, product(ascii_letters, repeat=2)))
+
+
+def brief(text: str) -> str:
+    """A text with half as much indentation and no empty lines."""
+    lines = (line for line in text.splitlines() if line)
+    return "".join(f"{' ' * ((len(line) - len(line.lstrip())) // 2)}{line.lstrip()}\n" for line in lines)

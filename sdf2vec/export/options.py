@@ -75,7 +75,6 @@ class Options(Struct, frozen=True, kw_only=True):
     title: Annotated[str, plain("what an export calls the picture (default: its name)", "TEXT")] = "a picture"
     alt: Annotated[str, plain("what is in the picture, for who can't see an SVG or a page", "TEXT")] = ""
     alone: Annotated[bool, plain("no files beside the text")] = False
-    near: Annotated[float | None, plain("dB that the scene is from the picture it was fitted to")] = None
     drawing: Annotated[str, plain("small SVG of the scene, in place of a page's own")] = ""
     original: Annotated[bytes | None, plain("PNG, JPEG or WebP that a page compares with")] = None
 

@@ -14,16 +14,15 @@ from ..shapes import KINDS
 from ..units import Parameter
 from .layouts import WORD
 from .packed_bits import CELL_BITS, CHOICE_BITS, COUNT_BITS, PLACE, Layout, by_precision
-from .packing import decoded, pack
+from .packing import Packed, decoded
 from .records import Form, Variant, drawn_by, joined_by
 
 
 class PackedText:
-    """The text of a scene, packed with room for edges to move by `slack`; `motion` is added to distances."""
+    """The text of a packed scene; `motion` is added to distances."""
 
-    def __init__(self, scene: Scene, slack: float, dialect: Dialect, motion: Expr = STILL) -> None:
-        self.packed, self.dialect = pack(scene, slack), dialect
-        packed = self.packed
+    def __init__(self, packed: Packed, scene: Scene, dialect: Dialect, motion: Expr = STILL) -> None:
+        self.packed, self.dialect = packed, dialect
         self.form = Form(packed.variants, packed.joins, scene.compositing)
         self.layout = Layout(packed.variants, packed.joins)
         opacity, falloff = (self._field(parameter) for parameter in LOOK)

@@ -13,6 +13,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterator, Sequence
+from copy import copy
 from dataclasses import dataclass, replace
 from functools import cache, cached_property, partial
 
@@ -122,7 +123,7 @@ def ranges_of(scene: Scene) -> Ranges:
 
 def pack(scene: Scene, slack: float = 0.0, limit: float = LIMIT) -> Packed:
     """The scene in the fewest bits that keep its picture within `limit` levels on a full HD canvas."""
-    packer = _Packer(scene, slack)
+    packer = Packer(scene, slack)
     if not scene.layers:
         return packer.pack(Precision(), [], 0.0)
     view = _View(scene)
@@ -142,7 +143,7 @@ def _largest(difference: Float32Array) -> float:
 
 
 def _fewest_bits(
-    packer: _Packer, view: _View, precision: Precision, limit: float
+    packer: Packer, view: _View, precision: Precision, limit: float
 ) -> tuple[list[int], float] | None:
     """Bits of each layer's fractions: few at first, more for those whose edges pass where the picture is off.
 
@@ -221,15 +222,17 @@ def _rows(which: torch.Tensor, tensor: torch.Tensor) -> torch.Tensor:
     return tensor[which]
 
 
-class _Packer:
-    """Turns the layers of one scene into bits and back."""
+class Packer:
+    """Turns the layers of one scene into bits and back. Their cells leave room for edges to move by `slack`."""
 
     def __init__(self, scene: Scene, slack: float) -> None:
         self.scene = scene
         self.ranges = ranges_of(scene)
         self.variants, self.joins = variants_of(scene), joins_of(scene)
         self.layout = Layout(self.variants, self.joins)
-        self.grid, self.cells = _cell_boxes(scene, slack)
+        boxes = _boxes(scene, slack) if scene.layers else None
+        self.grid = Grid(1, 1, 1.0, (0.0, 0.0)) if boxes is None else _grid_of(boxes)
+        self.cells = [] if boxes is None else _cells_of(boxes, self.grid)
         self.finest = min(CANVAS)
         self._ends = cache(lambda cells, parameter: _ends_of(parameter, self.ranges, *self._box(cells)))
         self._said: dict[int, tuple[int, Precision, Layer]] = {}  # of each layer the last that was asked for
@@ -294,7 +297,21 @@ class _Packer:
             if len(layers):
                 yield layers, chosen[(columns == column) & (rows == row)]
 
-    def pack(self, precision: Precision, counts: Sequence[int], error: float) -> Packed:
+    def moved(self, scene: Scene, slack: float) -> Packer:
+        """The same for layers that have moved a little: they keep their cells where they are still within."""
+        packer, now = copy(self), _cells_of(_boxes(scene, slack), self.grid)
+        kept = [
+            old if old[0] <= new[0] and old[1] <= new[1] and old[2] >= new[2] and old[3] >= new[3] else new
+            for old, new in zip(self.cells, now, strict=True)
+        ]
+        packer.scene, packer.cells, packer._said = scene, kept, {}
+        return packer
+
+    def ends(self, index: int, parameter: Parameter) -> Ends:
+        """What the fractions of a layer's parameter lie between."""
+        return self._ends(self.cells[index], parameter)
+
+    def pack(self, precision: Precision, counts: Sequence[int], error: float = 0.0) -> Packed:
         least = min(counts, default=1)
         stream = Stream()
         for layer, cells, count in zip(self.scene.layers, self.cells, counts, strict=True):
@@ -422,19 +439,18 @@ def _legal(value: float, parameter: Parameter) -> float:
     return min(max(value, least), parameter.unit.high)
 
 
-def _cell_boxes(scene: Scene, slack: float) -> tuple[Grid, list[tuple[int, int, int, int]]]:
-    """A grid that holds everything, and the cells (low x, low y, high x, high y) that each layer may touch."""
-    if not scene.layers:
-        return Grid(1, 1, 1.0, (0.0, 0.0)), []
-    boxes = _boxes(scene, slack)
+def _grid_of(boxes: Float64Array) -> Grid:
+    """A grid that holds everything."""
     low, high = boxes[:, :2].min(axis=0), boxes[:, 2:].max(axis=0)
     size = float((high - low).max()) * (1.0 + 1e-5)
     corner = (_rounded(low[0] - 2e-6 * size), _rounded(low[1] - 2e-6 * size))
-    per_unit = _rounded_down(CELLS / size)
-    grid = Grid(CELLS, CELLS, per_unit, corner)
-    places = np.floor((boxes - np.array([*corner, *corner])) * per_unit + [-1e-4, -1e-4, 1e-4, 1e-4])
-    clipped = np.clip(places, 0, CELLS - 1).astype(int).tolist()
-    return grid, [(a, b, c, d) for a, b, c, d in clipped]
+    return Grid(CELLS, CELLS, _rounded_down(CELLS / size), corner)
+
+
+def _cells_of(boxes: Float64Array, grid: Grid) -> list[tuple[int, ...]]:
+    """The cells (low x, low y, high x, high y) that each layer may touch."""
+    places = np.floor((boxes - np.array([*grid.low, *grid.low])) * grid.per_unit + [-1e-4, -1e-4, 1e-4, 1e-4])
+    return [tuple(box) for box in np.clip(places, 0, CELLS - 1).astype(int).tolist()]
 
 
 def _boxes(scene: Scene, slack: float) -> Float64Array:

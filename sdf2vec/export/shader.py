@@ -6,7 +6,7 @@ import base64
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from msgspec import structs
@@ -23,7 +23,7 @@ from ..operation import VEC2, VEC4
 from ..paints import FLAT
 from ..scene import MAX_SHAPES, Layer, Scene
 from ..templating import template
-from .dense_text import dense
+from .dense_text import brief, dense
 from .exported import Exported
 from .knobs import BREATH, GROUND, breath, dragged, knobs_of, turned
 from .layouts import (
@@ -40,12 +40,21 @@ from .layouts import (
 )
 from .options import BUFFER, GLSL_VERSIONS, Options
 from .records import BELOW, COUNT, JOIN, OWN, Form, first_records, form_of, records, slot
+from .rounding import Rounding
 from .tiles import COARSEST, Tiles
 
-packed_text: Callable[..., Any] = deferred("sdf2vec.export.packed_text", "PackedText")  # needs torch
+if TYPE_CHECKING:
+    from .packing import Packed
+
+packed_text: Callable[..., Any] = deferred(
+    "sdf2vec.export.packed_text", "PackedText"
+)  # needs torch, as all below
+pack: Callable[[Scene, float], Packed] = deferred("sdf2vec.export.packing", "pack")
+packed_rounding: Callable[..., Any] = deferred("sdf2vec.export.packed_rounding", "PackedRounding")
 SEEN = var("{seen}", VEC4)  # where a template puts the colour that is seen
 MOST_READABLE = TEXT_LIMIT // 50  # shapes; none is said in so few bytes
-TEXTS = ("readable", "table", "packed")  # layouts that may take the fewest bytes
+TEXTS = ("readable", "table", "packed")  # layouts that may take few bytes
+DENSE = "without comments, names and spaces"
 DATA_WIDTH = 256  # texels in a row of a data texture
 
 
@@ -105,19 +114,46 @@ def exported(scene: Scene, options: Options, name: str, suffix: str) -> Exported
 
 
 def forms(scene: Scene, options: Options, name: str, suffix: str) -> list[Callable[[], Exported]]:
-    """The same, and the layout that takes the fewest bytes, as dense as can be."""
-    target = TARGETS[name]
+    """The same, and the layout that takes the fewest bytes, as dense as can be; those without `rounding`."""
+    target, rounded = TARGETS[name], _may_be_rounded(scene, options, name)
     layouts = [layout for layout in TEXTS if layout in _host(target, options).layouts]
     asked = layouts if options.layout == "auto" else [options.layout]
+    tried = [layout for layout in asked if not (rounded and layout == "packed")]
 
     def densest() -> Exported:
-        made = (shader(scene, name, structs.replace(options, layout=layout)) for layout in asked)
+        made = (shader(scene, name, structs.replace(options, layout=layout)) for layout in tried)
         texts = [(dense(one.text, renamed=target.host is PASTED), one) for one in made]
         text, best = min(texts, key=lambda found: len(found[0].encode()))
-        return Exported(text, {}, (f"{best.about}; without comments, names and spaces",), best.error)
+        return Exported(text, {}, (f"{best.about}; {DENSE}",), best.error)
 
     finest = partial(exported, scene, options, name, suffix)
+    if not tried:
+        return []
     return [finest] if target.host is EMBEDDED or options.layout == BUFFER else [finest, densest]
+
+
+def _may_be_rounded(scene: Scene, options: Options, name: str) -> bool:
+    """Whether a size limit may be kept to by coarser numbers."""
+    asked = options.layout == "packed" or options.layout == "auto"
+    can = asked and scene.layers and "packed" in _host(TARGETS[name], options).layouts
+    return bool(can) and options.max_bytes is not None
+
+
+def rounding(scene: Scene, options: Options, name: str, suffix: str) -> Rounding | None:
+    """The packed text of a scene that suits it, as coarse as it may be; None where it is not to be packed."""
+    target = TARGETS[name]
+    if not (scene.layers and (options.layout == "packed" or _may_be_rounded(scene, options, name))):
+        return None
+    chosen = structs.replace(options, layout="packed")
+    slack = BREATH if _moves(target, options) else 0.0
+
+    def write(said: Scene, packed: Packed) -> Exported:
+        made = _shader(said, target, chosen, packed)
+        text = dense(made.text, renamed=target.host is PASTED)
+        return Exported(text, {}, (f"{made.about}; {DENSE}",))
+
+    made: Rounding = packed_rounding(scene, slack, write)
+    return made
 
 
 def shader(scene: Scene, name: str, options: Options) -> Shader:
@@ -146,10 +182,10 @@ def _buffered(target: Target, options: Options) -> tuple[Target, Options]:
     return replace(target, has_knobs=False, buffered=True), structs.replace(options, layout="auto")
 
 
-def _shader(scene: Scene, target: Target, options: Options) -> Shader:
+def _shader(scene: Scene, target: Target, options: Options, packed: Packed | None = None) -> Shader:
     slack = BREATH if _moves(target, options) else 0.0
     choice = choose(scene, options.layout, _host(target, options), slack)
-    job = _Job(scene, target, options, choice, slack)
+    job = _Job(scene, target, options, choice, slack, packed)
     parts = _BODIES[choice.layout if scene.layers else "readable"](job)
     data, error = parts.pop("array", None), parts.pop("error", 0.0)
     text = template(target.template).render(
@@ -167,7 +203,7 @@ def _shader(scene: Scene, target: Target, options: Options) -> Shader:
         place=expression(surface_point(var(target.surface, VEC2), _size(scene)), target.dialect),
         **(dict.fromkeys(("table", "packed", "tiles", "data")) | {"layers": []} | parts),
     )
-    said = _dense(text) if choice.layout == "packed" else text
+    said = brief(text) if choice.layout == "packed" else text
     return Shader(said, choice, data, error, target.buffered)
 
 
@@ -182,12 +218,6 @@ def statements_of(scene: Scene, name: str, options: Options, first: int = 0) -> 
 def statements_text(layers: Iterable[tuple[str, list[str]]]) -> str:
     """The lines of a text that say the layers."""
     return template("layers.jinja").render(layers=list(layers))
-
-
-def _dense(text: str) -> str:
-    """Half as much indentation, no empty lines."""
-    lines = (line for line in text.splitlines() if line)
-    return "".join(f"{' ' * ((len(line) - len(line.lstrip())) // 2)}{line.lstrip()}\n" for line in lines)
 
 
 def files_beside(made: Shader, suffix: str) -> dict[str, bytes]:
@@ -229,6 +259,7 @@ class _Job:
     options: Options
     choice: Choice
     slack: float
+    packed: Packed | None = None  # where it is, already
 
     @property
     def dialect(self) -> Dialect:
@@ -457,10 +488,11 @@ def _ivec4s(numbers: list[int]) -> list[str]:
 
 
 def _packed(job: _Job) -> dict[str, Any]:
-    text = packed_text(job.scene, job.slack, job.dialect, job.motion(var("float(i)")))
+    packed = job.packed or pack(job.scene, job.slack)
+    text = packed_text(packed, job.scene, job.dialect, job.motion(var("float(i)")))
     part = text.part() | {"coarsest": literal(COARSEST), "moving": bool(job.slack)}
     functions = job.functions([*text.roots, grid_point(P, P, P)])
-    return {"functions": functions, "packed": part, "error": text.packed.error}
+    return {"functions": functions, "packed": part, "error": packed.error}
 
 
 _BODIES = {"readable": _readable, "table": _table, "tiled": _tiled, "packed": _packed, "data": _data}

@@ -40,6 +40,7 @@ SEARCH, JOINT, LAST = 56, 128, 320  # pixels squared
 FEW = 4  # shapes that are placed by trial, also where their number is given
 LEVELS = 3.5 / 255  # by which pixels of one flat colour differ at most
 FLAT = 0.6  # share of pixels next to the same colour, of a drawing in flat colours
+PHOTOGRAPH, STILL_FLAT = 128, 0.58  # pixels squared, and how flat a drawing is there
 DISCS, LEFT = 16, 0.15  # so many discs leave so much of a soft drawing's variance, and more of a photograph's
 DISC_RESOLUTION = 48
 UNLIKELY = 1.5  # of the most shapes: a picture that needs more is no drawing
@@ -90,7 +91,7 @@ def fitted_picture(
 def _within(picture: Picture, settings: Settings, callback: Callback, share: Share) -> Fitted:
     """What a size limit holds: the shapes of a drawing, those that meet a target, or as many as there is room for."""
     has_target = (settings.target_psnr, settings.target_flip) != (None, None)
-    found = _few(picture, settings, callback)
+    found = None if is_photograph(picture) else _few(picture, settings, callback)
     if has_target and found is None:
         found = _painted(picture, settings, callback)
     if found is not None and share(found.scene) <= 1.0:
@@ -166,10 +167,20 @@ def _going_on(settings: Settings, found: Scene) -> Settings:
 
 def is_flat(picture: Picture) -> bool:
     """Whether most pixels have the colour of their neighbours."""
-    pixels = picture.premultiplied
+    return flatness(picture.premultiplied) >= FLAT
+
+
+def flatness(pixels: np.ndarray) -> float:
+    """The share of pixels [H, W, C] that have the colour of their neighbours."""
     across = np.abs(np.diff(pixels, axis=1)).max(axis=2, initial=0.0) <= LEVELS
     down = np.abs(np.diff(pixels, axis=0)).max(axis=2, initial=0.0) <= LEVELS
-    return min(share(across), share(down)) >= FLAT
+    return min(share(across), share(down))
+
+
+def is_photograph(picture: Picture) -> bool:
+    """Whether a picture is surely no drawing: smooth where it is large, and not flat where it is small, nor soft."""
+    small = scaled(picture.premultiplied, PHOTOGRAPH).permute(1, 2, 0).numpy()
+    return flatness(small) < STILL_FLAT and not _is_soft(picture)
 
 
 def share(chosen: np.ndarray) -> float:

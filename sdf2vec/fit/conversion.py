@@ -4,11 +4,9 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-import numpy as np
-
-from ..image import Picture, fitted_size, unpremultiply
-from ..metrics import psnr
-from ..render.draw import draw
+from ..image import Picture, fitted_size
+from ..quality import psnr_of
+from ..render.draw import draw, pixels_of
 from ..render.reference import canvas, layers_at
 from ..render.tensors import from_scene
 from ..scene import Layer, Scene, Shape
@@ -24,15 +22,17 @@ def over_of(scene: Scene) -> tuple[Scene, float]:
     """A scene under `over` with as many shapes that looks like an additive one, and how near it is in dB."""
     if not scene.layers:
         return replace(scene, compositing="over"), float("inf")
-    width, height = fitted_size(scene.width, scene.height, min(LARGEST, scene.width, scene.height))
-    wanted = draw(scene, width, height)
-    channels = 3 if scene.opaque else 4
-    pixels = wanted.permute(1, 2, 0).numpy()
-    picture = Picture(unpremultiply(pixels) if channels == 4 else np.ascontiguousarray(pixels[..., :3]))
+    picture = picture_of(scene)
     kinds = list(dict.fromkeys(layer.shapes[0].kind for layer in scene.layers))
     fitted = fit_picture(picture, settings_of(kind=kinds, start=_painted(scene), device="cpu"))
     found = replace(fitted, width=scene.width, height=scene.height)
-    return found, float(psnr(draw(found, width, height)[:channels], wanted[:channels]))
+    return found, psnr_of(found, picture)
+
+
+def picture_of(scene: Scene) -> Picture:
+    """A scene's render as a picture, of no more than `LARGEST` pixels along its shortest side."""
+    size = fitted_size(scene.width, scene.height, min(LARGEST, scene.width, scene.height))
+    return Picture(pixels_of(scene, *size))
 
 
 def _painted(scene: Scene) -> Scene:

@@ -1,14 +1,9 @@
-"""A scene as a small drawing can say it: corners on a grid, few softnesses, colours and opacities in steps.
-
-The numbers are put there a few at a time while the others go on descending, so that the rest makes up for what one
-loses by it (as in incremental network quantization, Zhou et al. 2017).
-"""
+"""A scene as a small drawing can say it: corners on a grid, few softnesses, colours and opacities in steps."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
-from functools import cache
+from functools import partial
 
 import numpy as np
 import torch
@@ -17,89 +12,44 @@ from ..arrays import Float64Array
 from ..blend import EDGE_DEVIATION
 from ..clusters import clustered
 from ..grain import Grain
-from ..image import Picture, fitted_size
 from ..layer import Slot
-from ..render import fused
-from ..render.draw import draw
 from ..render.tensors import Group, SceneTensors, from_scene, to_scene
 from ..scene import Scene
+from ..steps import Steps
 from ..units import COLOR, FALLOFF, OPACITY, POSITION
-from .adam import adam_over
-from .constraints import project
-from .losses import objective
-from .presets import L1_MSE, Phase
-from .surroundings import View
-from .views import scaled
+from .settling import Kept, Settling, Views, descend
 
 HARDLY = 0.6  # pixels: an edge of a smaller standard deviation is drawn sharp
 NARROWEST = (1.1, 1.5)  # pixels: of the narrowest blurs, on which renderers agree more or less
 LEAST_FREE = 1.8  # pixels, from which on softnesses are free
 LEAST = 2.15  # pixels, of a free one: renderers have nothing between it and the narrowest ones
 GROWTH = 1.1  # of a triangle's spread, where its edge moves outwards
-LARGEST = 512  # shortest side, in pixels, of the render that is fitted
 TINY = 1e-12
-PHASES = (
-    Phase("drawing", 60, 256, rate=0.2, end_rate=0.12, loss=L1_MSE),
-    Phase("drawing", 60, 320, rate=0.12, end_rate=0.05, loss=L1_MSE),
-)
-LATE, FIRM = 0.3, 0.95  # shares of the steps after which colours begin to settle, and all have
-
-
-def views_of(picture: Picture) -> Callable[[float], View]:
-    """A picture at any resolution."""
-    return cache(lambda resolution: View(scaled(picture.premultiplied, resolution), None))
-
-
-def views_of_render(scene: Scene) -> Callable[[float], View]:
-    """What a scene shows, likewise."""
-    width, height = fitted_size(scene.width, scene.height, min(LARGEST, scene.width, scene.height))
-    image = draw(scene, width, height).numpy().transpose(1, 2, 0)[..., : 3 if scene.opaque else 4]
-    return cache(lambda resolution: View(scaled(image, resolution), None))
 
 
 def rounded(scene: Scene, grain: Grain) -> Scene:
     """The scene with all numbers such that a drawing of this grain can say them."""
-    return _settled(scene, grain, lambda tensors, settling: None)
-
-
-def drawable(scene: Scene, views: Callable[[float], View], grain: Grain) -> Scene:
-    """The same, as near to a picture, which is given at any resolution, as it comes by descending meanwhile."""
-    pixel = 1.0 / min(scene.width, scene.height)
-    return _settled(scene, grain, lambda tensors, settling: _descend(tensors, settling, views, pixel))
-
-
-def _settled(scene: Scene, grain: Grain, descend: Callable[[SceneTensors, list[_Settling]], None]) -> Scene:
-    tensors, pixel = from_scene(scene), 1.0 / min(scene.width, scene.height)
-    if not scene.layers:
-        return scene
-    _soften(tensors, pixel, grain.softnesses)
-    settling = [_Settling(group, grain, tensors.size) for group in tensors.groups]
-    descend(tensors, settling)
-    for group in settling:
+    tensors = from_scene(scene)
+    for group in _settling(tensors, scene, grain):
         group.settle(1.0)
     return to_scene(tensors, scene.width, scene.height)
 
 
-def _descend(
-    tensors: SceneTensors, settling: list[_Settling], views: Callable[[float], View], pixel: float
-) -> None:
-    """Goes down the loss while ever more numbers settle."""
-    optimizer = adam_over(tensors, frozen=(FALLOFF.name,))
-    done, total = 0, sum(phase.steps for phase in PHASES)
-    for phase in PHASES:
-        view = views(phase.resolution)
-        channels, height, width = view.target.shape
-        measure = objective(phase.loss, view.target, view.weights)
-        for rate in phase.rates():
-            for group in settling:
-                group.settle(done / total)
-            optimizer.zero_grad()
-            measure(fused.composite(tensors, width, height, channels)).backward()
-            optimizer.step(rate)
-            project(tensors, pixel)
-            for group in settling:
-                group.hold()
-            done += 1
+def drawable(scene: Scene, views: Views, grain: Grain) -> Scene:
+    """The same, as near to a picture, which is given at any resolution, as it comes by descending meanwhile."""
+    tensors = from_scene(scene)
+    descend(tensors, _settling(tensors, scene, grain), views, scene, frozen=(FALLOFF.name,))
+    return to_scene(tensors, scene.width, scene.height)
+
+
+def _settling(tensors: SceneTensors, scene: Scene, grain: Grain) -> list[Settling]:
+    """The groups of a scene, whose layers have the falloffs of their classes from now on."""
+    if tensors.groups:
+        _soften(tensors, 1.0 / min(scene.width, scene.height), grain.softnesses)
+    return [
+        Settling(group, _steps(group, grain, tensors.size), partial(_unfold, group, grain))
+        for group in tensors.groups
+    ]
 
 
 # --- softnesses -----------------------------------------------------------------------------------------------
@@ -161,66 +111,38 @@ def _grown(corners: torch.Tensor, margin: torch.Tensor) -> torch.Tensor:
 # --- the grid -------------------------------------------------------------------------------------------------
 
 
-class _Settling:
-    """The layers of a group, of which ever more numbers stay where a drawing can say them."""
-
-    def __init__(self, group: Group, grain: Grain, size: tuple[float, float]) -> None:
-        self.group, self.grain = group, grain
-        self.middle = torch.tensor(size) * 0.5
-        order = torch.randperm(len(group), generator=torch.Generator().manual_seed(0))
-        self.turns = torch.empty(len(group)).scatter_(0, order, torch.arange(len(group)) / len(group))
-        self.kept: dict[Slot, torch.Tensor] = {}
-
-    @torch.no_grad()
-    def settle(self, share: float) -> None:
-        """Puts what is due after a share of the steps on the grid."""
-        for slot, values in self.group.values.items():
-            due = self.turns < (share - _first(slot)) / (FIRM - _first(slot))
-            kept = self.kept.setdefault(slot, torch.full_like(values, math.nan))
-            fresh = due & kept[:, 0].isnan()
-            if fresh.any():
-                kept[fresh] = self._snapped(slot, values)[fresh]
-        if self.group.structure[0].kind == "triangle":
-            self._unfold()
-        self.hold()
-
-    def _unfold(self) -> None:
-        """Moves a corner of triangles that have become one upright or level line, of which renderers draw no blur, or
-        none with an area, which are not seen without one."""
-        a, b, c = (kept for slot, kept in self.kept.items() if slot.parameter.unit is POSITION)
-        step = 1.0 / self.grain.units
-        corners = torch.stack([a, b, c], 1)
-        spread = corners.amax(1) - corners.amin(1)
-        ab, ac = b - a, c - a
-        flat = (ab[:, 0] * ac[:, 1] - ab[:, 1] * ac[:, 0]).abs() < 0.5 * step * step
-        flat &= (self.group.falloff[:, 0] == 0.0) | (spread.amin(1) < 0.5 * step)
-        across = spread.argmin(1)
-        c[flat, across[flat]] += step
-        point = spread.amax(1) < 0.5 * step
-        c[point, 1 - across[point]] += step
-
-    @torch.no_grad()
-    def hold(self) -> None:
-        """Moves what stays back to where it stays."""
-        for slot, kept in self.kept.items():
-            values = self.group.values[slot]
-            values.copy_(torch.where(kept.isnan(), values, kept))
-
-    def _snapped(self, slot: Slot, values: torch.Tensor) -> torch.Tensor:
-        """The nearest numbers that a drawing can say."""
-        grain, unit = self.grain, slot.parameter.unit
-        if unit is POSITION:
-            return ((values + self.middle) * grain.units).round() / grain.units - self.middle
-        if unit is COLOR:
-            return (values * grain.colors).round() / grain.colors
-        if unit is OPACITY:
-            return (values * grain.opacities).round().clamp(min=1.0) / grain.opacities
-        if slot.parameter.name == "radius":
-            outer = 0.5 * self.group.falloff
-            return ((values + outer) * grain.units).round().clamp(min=1.0) / grain.units - outer
-        return values
+def _steps(group: Group, grain: Grain, size: tuple[float, float]) -> dict[Slot, Steps]:
+    """What a drawing can say of a group's numbers; all else is written as it is."""
+    middle = torch.tensor(size, dtype=torch.float64) * 0.5
+    of_unit = {
+        POSITION: Steps(-middle, 1.0 / grain.units),
+        COLOR: Steps(0.0, 1.0 / grain.colors),
+        OPACITY: Steps(0.0, 1.0 / grain.opacities, least=1.0),
+    }
+    found = {slot: of_unit[slot.parameter.unit] for slot in group.values if slot.parameter.unit in of_unit}
+    outer = -0.5 * group.falloff.double()  # a radius is written where coverage is one half
+    radii = {slot: Steps(outer, 1.0 / grain.units, least=1.0) for slot in group.values if _is_radius(slot)}
+    return found | radii
 
 
-def _first(slot: Slot) -> float:
-    """The share of the steps after which the first numbers settle."""
-    return LATE if slot.parameter.unit in (COLOR, OPACITY) else 0.0
+def _is_radius(slot: Slot) -> bool:
+    return slot.parameter.name == "radius"
+
+
+def _unfold(group: Group, grain: Grain, kept: Kept) -> None:
+    """Moves a corner of triangles that have become one upright or level line, of which renderers draw no blur, or
+    none with an area, which are not seen without one.
+    """
+    if group.structure[0].kind != "triangle":
+        return
+    a, b, c = (values for slot, values in kept.items() if slot.parameter.unit is POSITION)
+    step = 1.0 / grain.units
+    corners = torch.stack([a, b, c], 1)
+    spread = corners.amax(1) - corners.amin(1)
+    ab, ac = b - a, c - a
+    flat = (ab[:, 0] * ac[:, 1] - ab[:, 1] * ac[:, 0]).abs() < 0.5 * step * step
+    flat &= (group.falloff[:, 0] == 0.0) | (spread.amin(1) < 0.5 * step)
+    across = spread.argmin(1)
+    c[flat, across[flat]] += step
+    point = spread.amax(1) < 0.5 * step
+    c[point, 1 - across[point]] += step

@@ -2,16 +2,22 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from functools import partial
+
 import numpy as np
 import torch
 
 from ..arrays import Float32Array
-from ..image import unpremultiply
+from ..image import fitted_size, unpremultiply
 from ..scene import Scene
+from ..threads import threads_of_its_own
 from . import fused, reference
 from .tensors import SceneTensors, from_scene
 
 LARGE = 1 << 25  # layers × pixels from which compiling kernels pays
+OFTEN = 1 << 20  # the same for what is drawn often
+GLANCE = 256  # shortest side, in pixels, at most
 
 
 def draw(scene: Scene, width: int | None = None, height: int | None = None) -> torch.Tensor:
@@ -34,6 +40,28 @@ def pixels_of(scene: Scene, width: int | None = None, height: int | None = None)
 def is_large(scene: Scene, width: int, height: int) -> bool:
     """Whether the reference would take long, so that compiling kernels pays."""
     return len(scene.layers) * width * height >= LARGE
+
+
+Compose = Callable[[SceneTensors, int, int], torch.Tensor]
+
+
+def composer(tensors: SceneTensors, width: int, height: int, channels: int) -> Compose:
+    """What draws a scene often, and as often its derivatives: premultiplied, before clamping, [channels, H, W]."""
+    if tensors.layer_count * width * height < OFTEN:
+        return lambda tensors, width, height: reference.composite(tensors, width, height)[:channels]
+    return partial(fused.composite, channels=channels)
+
+
+def glance(scene: Scene) -> Float32Array:
+    """The scene on a small canvas, before clamping, [3 or 4, H, W]: what roundings of it are compared with."""
+    tensors, size = (
+        from_scene(scene),
+        fitted_size(scene.width, scene.height, min(GLANCE, scene.width, scene.height)),
+    )
+    channels = 3 if scene.opaque else 4
+    with torch.no_grad(), threads_of_its_own():
+        pixels: Float32Array = composer(tensors, *size, channels)(tensors, *size).numpy()
+    return pixels
 
 
 def draw_fast(scene: Scene, width: int, height: int) -> torch.Tensor:

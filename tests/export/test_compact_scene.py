@@ -1,20 +1,26 @@
 """The compact scene: how near it comes to the render, in how many bytes, and what the command line makes of it."""
 
 import random
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
 import sdf2vec
 from sdf2vec import Layer, Scene, Shape
-from sdf2vec.compact_file import Steps, written
-from sdf2vec.export import compact_refit, compact_scene
+from sdf2vec.export import compact_scene
+from sdf2vec.export.options import Options
+from sdf2vec.fit import settling
+from sdf2vec.fit.conversion import picture_of
+from sdf2vec.fit.settling import settled, views_of
+from sdf2vec.image import load
+from sdf2vec.quality import psnr_of
 from tests.scenes import random_scene
 
 
 @pytest.fixture(autouse=True)
 def quick(monkeypatch):
-    monkeypatch.setattr(compact_refit, "ROUNDS", 2)
+    monkeypatch.setattr(settling, "PHASES", [replace(phase, steps=30) for phase in settling.PHASES])
 
 
 def triangles(count, side):
@@ -36,27 +42,30 @@ def nearness(scene, made):
     return -10 * np.log10(np.mean(np.square(one - other)))
 
 
-@pytest.mark.parametrize("aim", [None, 20.0, 40.0])
-def test_as_near_as_the_picture_wants(aim):
-    """A quarter of a dB lost where the fit is `near`; what is coarser takes fewer bytes."""
+def test_as_near_to_the_render_as_is_usual():
     scene = triangles(16, 24)
-    made = sdf2vec.exported(scene, "sdf", near=aim)
-    wanted = (compact_scene.USUAL if aim is None else aim + compact_scene.BELOW) - compact_scene.SHORT
-    assert nearness(scene, made) > wanted - 1.0
-    assert len(made.raw) < 16 * {None: 112, 20.0: 88, 40.0: 140}[aim] / 8 + 40
+    made = sdf2vec.exported(scene, "sdf")
+    assert nearness(scene, made) > 42.0
+    assert len(made.raw) < 16 * 112 / 8 + 40
 
 
-def test_what_is_fitted_again_is_nearer_in_the_same_bits(monkeypatch):
+def test_what_hardly_shows_beside_the_picture_is_left_out():
+    """A picture that the scene is 20 dB from: fewer bytes, and hardly any of the picture lost."""
     scene = triangles(16, 24)
-    sizer = compact_scene._Sizer(scene)
-    monkeypatch.setattr(compact_refit, "ROUNDS", 12)
-    bits = sizer.bits(30.0)
-    plain = written(scene, bits)
-    scales = Steps.of(scene, bits).scales
-    again = written(compact_scene.refitted(scene, scales), bits)
-    assert sizer.near(plain) > 28.0
-    assert sizer.near(again) > sizer.near(plain) + 0.8
-    assert len(again) < 1.03 * len(plain)
+    noise = np.random.default_rng(0).normal(0, 0.1, (24, 24, 3))
+    picture = load(np.clip(sdf2vec.render(scene) + noise, 0, 1).astype(np.float32))
+    made = sdf2vec.exported(scene, "sdf", picture=picture)
+    assert psnr_of(sdf2vec.loads(made.raw), picture) > psnr_of(scene, picture) - 0.16
+    assert len(made.raw) < 0.8 * len(sdf2vec.exported(scene, "sdf").raw)
+
+
+def test_what_is_fitted_again_is_nearer_in_the_same_bits():
+    scene = triangles(16, 24)
+    rounded = compact_scene.sdf_rounding(scene, Options())(28.0)
+    plain, said = rounded.write(scene)
+    again, said_again = rounded.write(settled(scene, rounded.steps_of, views_of(picture_of(scene))))
+    assert 26.0 < psnr_of(said, picture_of(scene)) < psnr_of(said_again, picture_of(scene)) - 0.5
+    assert len(again.raw) < 1.04 * len(plain.raw)
 
 
 def test_a_size_limit_is_kept_to():

@@ -44,7 +44,7 @@ def test_a_page_of_many_shapes_leaves_out_what_cannot_hold_them():
 
 def test_who_is_to_blame_does_not_depend_on_how_many_pixels_are_looked_at_at_a_time(monkeypatch):
     scene = random_scene(("circle", "box"), layers=12, joins=())
-    packer, view = packing._Packer(scene, 0.0), packing._View(scene)
+    packer, view = packing.Packer(scene, 0.0), packing._View(scene)
     counts, pixels = np.full(12, 6), np.arange(0, len(view.x), max(1, len(view.x) // 500))
     whole = packer.to_blame(view, pixels, counts)
     monkeypatch.setattr(packing, "BLAMED", 100)

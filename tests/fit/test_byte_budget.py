@@ -5,7 +5,8 @@ import pytest
 
 from sdf2vec import Sdf2vecError, fitted, share_of
 from sdf2vec.export import packing
-from sdf2vec.image import Picture, resize
+from sdf2vec.fit import auto
+from sdf2vec.image import Picture, load, resize
 from tests.scenes import random_scene
 
 
@@ -76,3 +77,18 @@ def test_the_share_is_that_of_the_largest_export(monkeypatch):
     assert share_of(["svg"], max_bytes=2000)(scene) == 2 * svg
     with pytest.raises(Sdf2vecError, match="unknown target"):
         share_of(["eps"], max_bytes=4000)
+
+
+def test_in_a_photograph_no_drawing_is_looked_for(monkeypatch):
+    """Smooth everywhere, as photographs are, and many colours."""
+    x, y = np.meshgrid(np.linspace(0, 1, 320), np.linspace(0, 1, 320))
+    hills = [np.sin(12 * x + 3 * y + c) * np.cos(11 * y - 4 * x * y) for c in range(3)]
+    picture = load(0.5 + 0.25 * np.stack(hills, axis=2).astype(np.float32))
+    assert auto.is_flat(picture)
+    assert auto.is_photograph(picture)
+    drawing = load(
+        np.pad(np.full((60, 80, 3), 0.3, np.float32), ((99, 99), (99, 99), (0, 0)), constant_values=0.8)
+    )
+    assert not auto.is_photograph(drawing)
+    monkeypatch.setattr(auto, "_few", lambda *given: pytest.fail("looked for a drawing"))
+    fitted(picture, preset="fast", kind="circle", max_falloff=0.0, share=by_count(5))

@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 from sdf2vec import Layer, Scene, Shape, fit
-from sdf2vec.fit.drawable import drawable, rounded, softnesses, views_of
+from sdf2vec.fit.drawable import drawable, rounded, softnesses
+from sdf2vec.fit.settling import views_of
 from sdf2vec.grain import GRAINS, Grain, is_drawable
 from sdf2vec.image import load
 from sdf2vec.quality import psnr_of

@@ -9,7 +9,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from sdf2vec import Layer, Scene, SceneError, Shape, load, loads
-from sdf2vec.compact_file import MAGIC, MOST_BITS, PRECISIONS, VERSION, Steps, _word, written
+from sdf2vec.compact_file import MAGIC, MOST_BITS, PRECISIONS, VERSION, Numbering, _word, written
 from sdf2vec.entropy import Writer
 from sdf2vec.layer import slots
 from sdf2vec.units import ANGLE
@@ -31,7 +31,7 @@ def test_all_that_a_scene_says_is_read(scene):
     found = loads(written(scene, FINE))
     assert (found.width, found.height, found.compositing) == (scene.width, scene.height, scene.compositing)
     np.testing.assert_allclose(found.ground, scene.ground, atol=0.5 / 4095 + 1e-5)
-    scales = Steps.of(scene, FINE).scales
+    scales = Numbering.of(scene, FINE).scales
     for one, other in zip(scene.layers, found.layers, strict=True):
         assert one.structure == other.structure
         numbers = iter(zip(one.numbers, other.numbers, strict=True))

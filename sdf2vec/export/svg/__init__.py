@@ -19,7 +19,7 @@ from ...scene import Scene
 from ..exported import MARK, Exported
 from ..options import EXACT, FIXED, Accepts, Options
 from .display import Drawing
-from .layers import drawing, drawn
+from .layers import drawing, drawn, sketched
 from .plan import DETAILS, DETAILS_EXACT, Detail, Planner
 from .writer import Style, written
 
@@ -72,6 +72,11 @@ def small_svg(scene: Scene, options: Options, grain: Grain) -> Exported:
     return Exported(_written(drawing, options, _small(grain)), error=error)
 
 
+def sketch_svg(scene: Scene, options: Options, grain: Grain) -> Exported:
+    """The same, quickly: its size tells that of the drawing."""
+    return Exported(_written(sketched(scene, grain), options, _small(grain)))
+
+
 def data_uri(scene: Scene, options: Options) -> Exported:
     """The SVG as a data URI, for `src="…"` and `url("…")`: URL-encoded, or in base64 where that is smaller."""
     return data_uri_forms(scene, options)[0]()
@@ -85,6 +90,11 @@ def data_uri_forms(scene: Scene, options: Options) -> list[Callable[[], Exported
 def small_data_uri(scene: Scene, options: Options, grain: Grain) -> Exported:
     """The small drawing as a data URI."""
     return _as_uri(partial(small_svg, scene, options, grain))
+
+
+def sketch_data_uri(scene: Scene, options: Options, grain: Grain) -> Exported:
+    """The same, quickly."""
+    return _as_uri(partial(sketch_svg, scene, options, grain))
 
 
 def _as_uri(make: Callable[[], Exported]) -> Exported:

@@ -30,7 +30,7 @@ from .isobands import (
 )
 from .outlines import TOLERANCE, core, edge_of, placed, upright
 from .plan import Detail, Plan
-from .refit_appearance import refitted
+from .refit_appearance import HASTY, refitted
 from .sampling import covers
 from .union_gradient import fill_of, mean_color, ramp_of
 from .union_partition import part_bands
@@ -63,10 +63,15 @@ def drawn(scene: Scene, grain: Grain) -> tuple[Drawing, float]:
     """
     canvas = Canvas.whole(scene, grain.units)
     off = {i: drawn_difference(layer, canvas) for i, layer in enumerate(scene.layers) if layer.falloff}
-    scene, error = refitted(scene, layers_at(scene), off, (), grain.colors, grain.opacities)
+    scene, error = refitted(scene, layers_at(scene), off, (), grain.colors, grain.opacities, HASTY)
+    return sketched(scene, grain), 255.0 * math.sqrt(error)
+
+
+def sketched(scene: Scene, grain: Grain) -> Drawing:
+    """The same without colours that make up for what blurs do: of about as many bytes."""
+    canvas = Canvas.whole(scene, grain.units)
     items = tuple(drawn_figure(layer, canvas) for layer in scene.layers)
-    drawing = Drawing(canvas.width, canvas.height, canvas.pixels, canvas.digits, scene.background, items)
-    return drawing, 255.0 * math.sqrt(error)
+    return Drawing(canvas.width, canvas.height, canvas.pixels, canvas.digits, scene.background, items)
 
 
 @dataclass(frozen=True)

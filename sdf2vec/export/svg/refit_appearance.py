@@ -23,7 +23,7 @@ from .visibility import LayerSamples, showing, steps_over
 
 CELLS = 64  # of a difference that is kept, along its longest side
 LARGEST = 2048  # layers: more equations than these are not solved
-ROUNDS = 3  # of opacities, then colours
+ROUNDS, HASTY = 3, 1  # of opacities, then colours; of those for what was fitted to be drawn
 RIDGE = 1e-3  # how much, of a mean layer's weight, the old value counts
 GREY = 0.5 / 255.0  # channels that differ by less are the same
 FREEDOM = 0.1  # that an opacity may change by
@@ -69,6 +69,7 @@ def refitted(
     cut: Sequence[int] = (),
     colors: int = 0,
     opacities: int = 0,
+    rounds: int = ROUNDS,
 ) -> Refitted:
     """The scene with the colours and opacities whose drawing is nearest to the scene's render.
 
@@ -80,7 +81,7 @@ def refitted(
         return Refitted(scene)
     stack, wanted = _stack(scene, samples, drawn, cut)
     best, least = stack, stack.error(wanted)
-    for _ in range(ROUNDS if drawn or cut else 0):
+    for _ in range(rounds if drawn or cut else 0):
         stack = stack.with_opacities(wanted).with_colors(wanted)
         if (error := stack.error(wanted)) < least:
             best, least = stack, error

@@ -1,0 +1,138 @@
+"""A scene whose numbers are all such that an export can write them, fitted while they come to be so.
+
+They are put on steps a share at a time while the others go on descending, so that the rest makes up for what one loses
+by it (as in incremental network quantization, Zhou et al. 2017): places first, colours last.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping, Sequence
+from functools import cache
+
+import torch
+
+from ..image import Picture
+from ..layer import Slot
+from ..render.draw import composer
+from ..render.tensors import Group, SceneTensors, from_scene, to_scene
+from ..scene import Scene
+from ..steps import Steps, StepsOf
+from ..threads import threads_of_its_own
+from .adam import adam_over
+from .constraints import project
+from .losses import objective
+from .presets import MSE, Phase
+from .surroundings import View
+from .views import scaled
+
+Views = Callable[[float], View]  # a picture at any resolution
+Kept = Mapping[Slot, torch.Tensor]  # numbers [G, width] that stay where they are; NaN for what does not yet
+PHASES = (
+    Phase("settling", 60, 256, rate=0.15, end_rate=0.09, loss=MSE),
+    Phase("settling", 60, 320, rate=0.09, end_rate=0.04, loss=MSE),
+)
+DUE = {  # from which share of the steps on numbers of a precision settle, and when all have
+    "place": (0.0, 0.6),
+    "falloff": (0.4, 0.65),
+    "opacity": (0.45, 0.75),
+    "color": (0.5, 0.97),
+}
+FEW, LARGEST = 5, 2048  # layers: fewer are found exactly, more would take too long
+SORTS = 6  # of layers: kernels for more take too long to compile
+
+
+def views_of(picture: Picture) -> Views:
+    """A picture at any resolution."""
+    return cache(lambda resolution: View(scaled(picture.premultiplied, resolution), None))
+
+
+class Settling:
+    """The layers of a group, of which ever more numbers stay where they can be written.
+
+    `mend` changes, in place, numbers that are on steps but can't be so together.
+    """
+
+    def __init__(
+        self, group: Group, steps: Mapping[Slot, Steps], mend: Callable[[Kept], None] = lambda kept: None
+    ) -> None:
+        self.group, self.steps, self.mend = group, steps, mend
+        order = torch.randperm(len(group), generator=torch.Generator().manual_seed(0))
+        self.turns = torch.empty(len(group)).scatter_(0, order, torch.arange(len(group)) / len(group))
+        self.kept = {slot: torch.full_like(group.values[slot], math.nan) for slot in steps}
+
+    @torch.no_grad()
+    def settle(self, share: float) -> None:
+        """Puts what is due after a share of the steps where it stays."""
+        for slot, steps in self.steps.items():
+            unit, kept = slot.parameter.unit, self.kept[slot]
+            first, last = DUE[unit.codec.precision]
+            fresh = (self.turns < (share - first) / (last - first)) & kept[:, 0].isnan()
+            if fresh.any():
+                kept[fresh] = _legal(steps.nearest(self.group.values[slot].double(), unit), slot)[fresh].to(
+                    kept
+                )
+        self.mend(self.kept)
+        self.hold()
+
+    @torch.no_grad()
+    def hold(self) -> None:
+        """Moves what stays back to where it stays."""
+        for slot, kept in self.kept.items():
+            values = self.group.values[slot]
+            values.copy_(torch.where(kept.isnan(), values, kept))
+
+
+def _legal(values: torch.Tensor, slot: Slot) -> torch.Tensor:
+    """What a scene takes: a length that must be positive may have become 0."""
+    unit = slot.parameter.unit
+    least = unit.low + (10.0**-unit.decimals if slot.parameter.positive else 0.0)
+    return values.clamp(least, unit.high)
+
+
+def settled(scene: Scene, steps_of: StepsOf, views: Views) -> Scene:
+    """The scene as it can be written, as near to a picture as it comes; only rounded where that is not tried."""
+    tensors = from_scene(scene)
+    settling = [Settling(group, steps_of(group)) for group in tensors.groups]
+    descend(tensors, settling, views, scene)
+    return to_scene(tensors, scene.width, scene.height)
+
+
+def descend(
+    tensors: SceneTensors,
+    settling: Sequence[Settling],
+    views: Views,
+    scene: Scene,
+    frozen: tuple[str, ...] = (),
+) -> None:
+    """Goes down the difference from a picture while ever more numbers of a scene settle, until all have; in place.
+
+    `frozen`: names of units of which nothing moves.
+    """
+    if FEW <= tensors.layer_count <= LARGEST and len(tensors.groups) <= SORTS:
+        with threads_of_its_own():
+            _descend(tensors, settling, views, 1.0 / min(scene.width, scene.height), frozen)
+    for group in settling:
+        group.settle(1.0)
+
+
+def _descend(
+    tensors: SceneTensors, settling: Sequence[Settling], views: Views, pixel: float, frozen: tuple[str, ...]
+) -> None:
+    optimizer = adam_over(tensors, frozen=frozen)
+    done, total = 0, sum(phase.steps for phase in PHASES)
+    for phase in PHASES:
+        view = views(phase.resolution)
+        channels, height, width = view.target.shape
+        compose = composer(tensors, width, height, channels)
+        measure = objective(phase.loss, view.target, view.weights)
+        for rate in phase.rates():
+            for group in settling:
+                group.settle(done / total)
+            optimizer.zero_grad()
+            measure(compose(tensors, width, height)).backward()
+            optimizer.step(rate)
+            project(tensors, pixel)
+            for group in settling:
+                group.hold()
+            done += 1
