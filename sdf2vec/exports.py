@@ -91,6 +91,9 @@ class Exports:
         exporter = EXPORTERS[target]
         scene = self._over[0] if exporter.accepts(options).refusal(self.scene) else self.scene
         is_small = options.svg_fidelity == PICTURE and not _is_plain(scene)
+        if exporter.holds_drawing and is_small:
+            drawing = self.sketched("svg", Options(title=options.title, alt=options.alt))
+            options = structs.replace(options, drawing=str(drawing.data))
         if exporter.sketch and is_small and exporter.draws(scene, options):
             return exporter.sketch(_rounded(scene, USUAL[0]), options, USUAL[0])
         if rounding := self._rounding(exporter, scene, options):
@@ -123,7 +126,7 @@ class Exports:
         if small := self._near_enough(exporter, scene, options):
             yield small
         if rounding := self._rounding(exporter, scene, options):
-            yield self._rounded_near(rounding, scene)
+            yield self._rounded_near(exporter, rounding, scene)
         yield exporter.from_finest(scene, options)[0]()
 
     def _near_enough(self, exporter: Exporter, scene: Scene, options: Options) -> Exported | None:
@@ -194,13 +197,15 @@ class Exports:
         may = near or options.max_bytes is not None or not exporter.forms
         return exporter.rounding(scene, options) if may else None
 
-    def _rounded_near(self, rounding: Rounding, scene: Scene) -> Exported:
+    def _rounded_near(self, exporter: Exporter, rounding: Rounding, scene: Scene) -> Exported:
         """The smallest that loses hardly anything of the picture; where none is found, the nearest."""
         aim = self._aim(scene)
         enough = -10 * math.log10(max(10 ** (-self._near(scene) / 10) + self._allowed(scene), 1e-12))
         best = (Exported(""), -math.inf)
         for _ in range(TRIES):
-            best = max(best, self._fit_rounded(rounding(aim), scene, enough), key=lambda found: found[1])
+            best = max(
+                best, self._fit_rounded(exporter, rounding(aim), scene, enough), key=lambda found: found[1]
+            )
             if best[1] >= enough or aim >= FINEST:
                 break
             aim = min(aim + STEP, FINEST)
@@ -221,13 +226,13 @@ class Exports:
         aims = [*np.arange(first, COARSEST, -STEP).tolist(), COARSEST]
         begin = bisect_left(aims, True, key=lambda aim: limit.share(rounding(aim).write(scene)[0].raw) <= 1)
         for aim in aims[min(begin, len(aims) - 1) :]:
-            yield partial(self._fitted_to, rounding, scene, aim)
+            yield partial(self._fitted_to, exporter, rounding, scene, aim)
 
-    def _fitted_to(self, rounding: Rounding, scene: Scene, aim: float) -> Exported:
-        return self._fit_rounded(rounding(aim), scene)[0]
+    def _fitted_to(self, exporter: Exporter, rounding: Rounding, scene: Scene, aim: float) -> Exported:
+        return self._fit_rounded(exporter, rounding(aim), scene)[0]
 
     def _fit_rounded(
-        self, rounded: Rounded, scene: Scene, enough: float = math.inf
+        self, exporter: Exporter, rounded: Rounded, scene: Scene, enough: float = math.inf
     ) -> tuple[Exported, float]:
         """One export, of the numbers with which it is nearest to the picture, and how near that is in dB; they are
         not fitted where rounding them is `enough`.
@@ -238,7 +243,7 @@ class Exports:
             again, found = rounded.write(_settled(scene, rounded.steps_of, self._views))
             made, near = max((made, near), (again, self._near(found)), key=lambda tried: tried[1])
         lost = _lost(self._near(scene) - near) if self.picture else f"{near:.1f} dB from the render"
-        return replace(made, notes=(*made.notes, f"numbers rounded: {lost}")), near
+        return replace(made, notes=(*made.notes, f"{exporter.suffix[1:]}: numbers rounded, {lost}")), near
 
     def _aim(self, scene: Scene) -> float:
         """How near numbers that are only rounded are to be to the render, in dB, before they are fitted."""
