@@ -9,7 +9,6 @@ from dataclasses import replace
 from functools import cache, cached_property, partial
 from typing import TYPE_CHECKING
 
-import numpy as np
 from msgspec import structs
 
 from .declared import check_choice
@@ -223,7 +222,7 @@ class Exports:
                 yield from exporter.from_finest(scene, options)
             return
         first = FINEST if exporter.forms else self._aim(scene)
-        aims = [*np.arange(first, COARSEST, -STEP).tolist(), COARSEST]
+        aims = [*(first - STEP * step for step in range(math.ceil((first - COARSEST) / STEP))), COARSEST]
         begin = bisect_left(aims, True, key=lambda aim: limit.share(rounding(aim).write(scene)[0].raw) <= 1)
         for aim in aims[min(begin, len(aims) - 1) :]:
             yield partial(self._fitted_to, exporter, rounding, scene, aim)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 
+import numpy as np
 import pytest
 
 import sdf2vec
@@ -13,6 +14,7 @@ from sdf2vec.export.options import Accepts, Options
 from sdf2vec.exports import Exports
 from sdf2vec.fit import conversion
 from sdf2vec.fit.presets import PRESETS
+from sdf2vec.image import Picture
 from sdf2vec.metrics import psnr
 from sdf2vec.render.draw import draw
 from tests.scenes import random_scene
@@ -120,3 +122,10 @@ def test_the_same_light_under_over(monkeypatch):
 def test_a_scene_without_shapes_needs_no_fit():
     over, decibels = conversion.over_of(Scene(4, 4, (), (0.5, 0.5, 0.5), "additive"))
     assert (over, decibels) == (Scene(4, 4, (), (0.5, 0.5, 0.5)), float("inf"))
+
+
+def test_a_sketched_page_holds_a_small_drawing():
+    scene = random_scene(("triangle",), layers=12, paints=("flat",), joins=())
+    exports = Exports(scene, Picture(np.random.default_rng(0).random((40, 60, 3), np.float32)))
+    sketched, made = (len(one.raw) for one in (exports.sketched("html", Options()), exports.export("html")))
+    assert sketched == pytest.approx(made, rel=0.05)

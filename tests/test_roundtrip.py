@@ -92,7 +92,8 @@ def test_a_scene_without_layers(target, require_engine):
 def photo_scene():
     """A real photo, fitted with all kinds."""
     data = pytest.importorskip("skimage.data")
-    return sdf2vec.fit(data.coffee()[::4, ::4], 24, kind="mixed", preset="fast", seed=3)
+    start = random_scene(SOFT, layers=20, width=150, height=100, paints=("flat",), joins=())
+    return sdf2vec.fit(data.coffee()[::4, ::4], 24, kind="mixed", preset="fast", seed=3, start=start)
 
 
 @pytest.mark.parametrize("target", ["glsl", "shadertoy", "wgsl"])

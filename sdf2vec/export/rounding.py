@@ -10,15 +10,15 @@ import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from itertools import product
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
-import numpy as np
-
-from ..arrays import Float32Array
 from ..deferred import deferred
 from ..scene import Scene
 from ..steps import StepsOf
 from .exported import Exported
+
+if TYPE_CHECKING:
+    from ..arrays import Float32Array
 
 glance: Callable[[Scene], Float32Array] = deferred("sdf2vec.render.draw", "glance")  # torch
 
@@ -64,7 +64,8 @@ class Chooser:
         wanted = glance(scene)
 
         def error(name: str) -> float:
-            return float(np.mean(np.square(glance(said({**most, name: looked_at[name]})) - wanted)))
+            wrong = glance(said({**most, name: looked_at[name]})) - wanted
+            return float((wrong * wrong).mean())
 
         return cls(counts, {name: error(name) for name in counts}, looked_at, least, most)
 

@@ -12,6 +12,7 @@ from ..render import fused
 from ..render.tensors import Group, SceneTensors, from_scene, to_scene
 from ..scene import Scene
 from ..units import BACKGROUND, COLOR, Unit
+from .constraints import thicknesses_of
 from .settings import Settings
 from .views import view_of
 
@@ -33,7 +34,7 @@ def concise(scene: Scene, picture: Picture, settings: Settings) -> Scene:
     units = _units_of(tensors, still)
     allowed = max(LOSS * wrong, UNSEEN) / max(len(units), 1)
     for unit in units:
-        tensors = _coarsest(tensors, unit, before, allowed)
+        tensors = _coarsest(tensors, unit, before, allowed, 1.0 / min(picture.width, picture.height))
         before = _drawn(tensors, view.target.shape)
     return to_scene(tensors, scene.width, scene.height)
 
@@ -44,22 +45,43 @@ def _units_of(scene: SceneTensors, without: Collection[Unit]) -> list[Unit]:
     return [unit for unit in dict.fromkeys([*every, BACKGROUND]) if unit not in without]
 
 
-def _coarsest(scene: SceneTensors, unit: Unit, before: torch.Tensor, allowed: float) -> SceneTensors:
+def _coarsest(
+    scene: SceneTensors, unit: Unit, before: torch.Tensor, allowed: float, pixel: float
+) -> SceneTensors:
     """The scene with the numbers of a unit rounded as far as that moves its render by no more than is allowed."""
     for decimals in range(unit.decimals - 1, 0, -1):
-        tried = _rounded(scene, unit, decimals)
+        tried = _rounded(scene, unit, decimals, pixel)
         if float((_drawn(tried, before.shape) - before).square().mean()) > allowed:
             break
         scene = tried
     return scene
 
 
-def _rounded(scene: SceneTensors, unit: Unit, decimals: int) -> SceneTensors:
-    """The scene with the numbers of a unit rounded; what must be positive stays so."""
-    groups = [_rounded_group(group, unit, decimals) for group in scene.groups]
+def _rounded(scene: SceneTensors, unit: Unit, decimals: int, pixel: float) -> SceneTensors:
+    """The scene with the numbers of a unit rounded; what must be positive stays so, and nothing gets too thin."""
     if unit is BACKGROUND and scene.opaque:
         return replace(scene, background=scene.background.round(decimals=decimals))
-    return replace(scene, groups=groups)
+    thickness = [_thickness(scene, group) for group in scene.groups]
+    rounded = replace(scene, groups=[_rounded_group(group, unit, decimals) for group in scene.groups])
+    thin = [
+        _thickness(rounded, group) < before.clamp(max=pixel)
+        for group, before in zip(rounded.groups, thickness, strict=True)
+    ]
+    kept = [_unless(*groups) for groups in zip(thin, rounded.groups, scene.groups, strict=True)]
+    return replace(rounded, groups=kept)
+
+
+def _thickness(scene: SceneTensors, group: Group) -> torch.Tensor:
+    """The least width of each layer's shapes, [G], in scene units."""
+    return torch.stack(thicknesses_of(replace(scene, groups=[group]))).amin(0)
+
+
+def _unless(which: torch.Tensor, new: Group, old: Group) -> Group:
+    """The new layers but for some, which stay the old ones."""
+    values = {
+        slot: torch.where(which[:, None], old.values[slot], tensor) for slot, tensor in new.values.items()
+    }
+    return Group(new.structure, new.order, values)
 
 
 def _rounded_group(group: Group, unit: Unit, decimals: int) -> Group:

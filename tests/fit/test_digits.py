@@ -4,9 +4,11 @@ import numpy as np
 import pytest
 
 from sdf2vec import Scene, fit, render
+from sdf2vec.fit.constraints import thicknesses_of
 from sdf2vec.fit.digits import concise
 from sdf2vec.fit.settings import settings_of
 from sdf2vec.image import Picture
+from sdf2vec.render.tensors import from_scene
 from sdf2vec.scene import Layer, Shape
 from sdf2vec.scene_file import dumps, loads
 
@@ -46,3 +48,19 @@ def test_a_palette_stays_what_it_is():
     scene = fit(picture, 5, preset="fast", palette="#123456,#fedcba")
     exact = {tuple(round(v / 255, 5) for v in color) for color in ((0x12, 0x34, 0x56), (0xFE, 0xDC, 0xBA))}
     assert {color for layer in scene.layers for color in layer.colors} <= exact
+
+
+def test_nothing_gets_thinner_than_a_pixel():
+    """A picture that asks for few digits, and triangles whose shortest altitude is a pixel."""
+    r = np.random.default_rng(1)
+    picture, layers = Picture(r.random((32, 32, 3), np.float32)), []
+    for turn in r.random(24) * 6.28:
+        along, across = np.array([np.cos(turn), np.sin(turn)]), np.array([-np.sin(turn), np.cos(turn)])
+        first = r.uniform(-0.2, 0.2, 2)
+        a, b, c = map(tuple, (first, first + 0.4 * along, first + 0.2 * along + across / 32))
+        layers.append(Layer((Shape.of("triangle", tuple(r.random(3).tolist()), a=a, b=b, c=c),)))
+    found = concise(Scene(32, 32, tuple(layers), (0, 0, 0)), picture, settings_of(24))
+    moved = sum(one.numbers != other.numbers for one, other in zip(layers, found.layers, strict=True))
+    (widths,) = thicknesses_of(from_scene(found))
+    assert moved > 12
+    assert float(widths.min()) > 0.9999 / 32
