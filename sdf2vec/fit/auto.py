@@ -23,10 +23,10 @@ from ..scene import Scene
 from ..threads import threads_of_its_own
 from .backends import CPU, choose
 from .byte_budget import SLOPE, Share, within
-from .digits import concise
+from .digits import concise, fit_concisely
 from .initialization import Layers, background_of, empty_groups
 from .joining import Search
-from .loop import Callback, Progress, Stopped, fit_picture
+from .loop import Callback, Progress, Stopped
 from .matching_pursuit import Painted, find_discs
 from .offers import common_color
 from .one_more import gain_of_one_more
@@ -118,14 +118,9 @@ def _few(picture: Picture, settings: Settings, callback: Callback) -> Fitted | N
             return None
         if drawing.error <= (drawing.floor if settings.target_psnr else GOOD):
             return Fitted(found, _counted(found))
-    painted = _fit(picture, _going_on(settings, found), callback)
+    painted = fit_concisely(picture, _going_on(settings, found), callback)
     as_wanted = settings.shapes == AUTO or (settings.shapes == found.shape_count and settings.loss is None)
     return _told(_nearest([painted, *([found] if as_wanted else [])], picture), picture, settings)
-
-
-def _fit(picture: Picture, settings: Settings, callback: Callback) -> Scene:
-    """A fit of so many shapes, with no more digits than it needs."""
-    return concise(fit_picture(picture, settings, callback), picture, settings)
 
 
 def pixel_of(picture: Picture) -> float:
@@ -278,7 +273,7 @@ def ground_of(target: torch.Tensor) -> torch.Tensor:
 
 def _painted(picture: Picture, settings: Settings, callback: Callback) -> Fitted:
     """The fit of a picture that is no drawing."""
-    scene = _fit(picture, settings, callback)
+    scene = fit_concisely(picture, settings, callback)
     if settings.shapes != AUTO:
         return Fitted(scene)
     if settings.target_psnr is None and settings.target_flip is None:
@@ -307,7 +302,7 @@ def _fewer(
         count = min(max(math.ceil(guess), low + 1), high - 1)
         if count <= low:
             return
-        tried = _fit(picture, structs.replace(settings, shapes=count), callback)
+        tried = fit_concisely(picture, structs.replace(settings, shapes=count), callback)
         missed = _missed(tried, picture, settings)
         if missed <= 0:
             high, above = count, missed

@@ -13,9 +13,9 @@ from ..image import Picture
 from ..quality import psnr_of
 from ..render.tensors import SceneTensors, from_scene, to_scene
 from ..scene import Scene
-from .digits import concise
+from .digits import fit_concisely
 from .initialization import background_of
-from .loop import Callback, fit_picture
+from .loop import Callback
 from .settings import Settings
 from .surroundings import View
 from .thinning import lighter
@@ -49,8 +49,7 @@ def within(picture: Picture, settings: Settings, share: Share, callback: Callbac
     chosen = max(probes, key=lambda probe: probe.hoped)
     count = chosen.wanted
     for _ in range(FITS):
-        scene = fit_picture(picture, structs.replace(chosen.settings, shapes=count), callback)
-        scene = concise(scene, picture, settings)
+        scene = fit_concisely(picture, structs.replace(chosen.settings, shapes=count), callback)
         taken = share(scene)
         each = (taken - empty) / count
         scene, taken = _trimmed(scene, view, share, each, taken)
@@ -82,8 +81,7 @@ def _sorts(settings: Settings) -> Iterator[Settings]:
 def _probe(settings: Settings, picture: Picture, share: Share, callback: Callback) -> Probe:
     """What a fit of few shapes promises of one of as many as the limit can hold."""
     count = min(PROBED, settings.most)
-    few = fit_picture(picture, structs.replace(settings, shapes=count, preset="fast"), callback)
-    few = concise(few, picture, settings)
+    few = fit_concisely(picture, structs.replace(settings, shapes=count, preset="fast"), callback)
     least, most = share(replace(few, layers=few.layers[:1])), share(few)
     each = max((most - least) / max(count - 1, 1), 1e-9)
     wanted = 1 + math.floor((1.0 - least) / each) if least <= 1 else 0

@@ -13,12 +13,18 @@ from ..render.tensors import Group, SceneTensors, from_scene, to_scene
 from ..scene import Scene
 from ..units import BACKGROUND, COLOR, Unit
 from .constraints import thicknesses_of
+from .loop import Callback, fit_picture
 from .settings import Settings
 from .views import view_of
 
 RESOLUTION = 512  # pixels squared
 LOSS = 0.002  # of the mean squared error, that rounding may add: less than 0.01 dB
 UNSEEN = (0.1 / 255) ** 2  # mean squared change of a render that is always allowed: a tenth of a level
+
+
+def fit_concisely(picture: Picture, settings: Settings, callback: Callback) -> Scene:
+    """A fit of so many shapes, with no more digits than it needs."""
+    return concise(fit_picture(picture, settings, callback), picture, settings)
 
 
 def concise(scene: Scene, picture: Picture, settings: Settings) -> Scene:

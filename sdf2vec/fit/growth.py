@@ -14,7 +14,7 @@ from ..blend import COMPOSITING
 from ..render.tensors import Group, SceneTensors
 from .adam import Adam
 from .initialization import Layers, Places, groups_at, straight
-from .matching_pursuit import Missing, Painted, find_discs
+from .matching_pursuit import canvas_of, find_discs
 
 PROBES = 8  # random images that estimate what a layer does to the picture
 ROOM = 0.8  # size of a new shape, in radii of the disc whose place it takes: its falloff lies outside of that
@@ -83,13 +83,9 @@ def densify(
 
     As many as `count`, fewer where no more would help. `weights` [H, W]: how much an error matters.
     """
-    image, target = image.detach().cpu(), target.cpu()
-    weights = torch.ones(target.shape[1:]) if weights is None else weights.cpu()
-    canvas = Missing(target - image, weights) if layers.signed else Painted(image.clone(), target, weights)
-    found = find_discs(canvas, count)
+    found = find_discs(canvas_of(image, target, weights, layers.signed), count)
     height, width = target.shape[1:]
-    centers = (found.centers / torch.tensor([width, height]) - 0.5) * torch.tensor(tensors.size)
-    sizes = found.radii * ROOM * (tensors.size[0] / width)
+    centers, sizes = found.placed(width, height, tensors.size, ROOM)
     if layers.signed:
         amounts = torch.nn.functional.pad(found.colors, (0, 4 - found.colors.shape[1]))
         colors = amounts.clamp(-1.0, 1.0)

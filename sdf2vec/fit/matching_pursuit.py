@@ -37,6 +37,13 @@ class Discs(NamedTuple):
     radii: torch.Tensor
     colors: torch.Tensor
 
+    def placed(
+        self, width: int, height: int, size: tuple[float, float], share: float = 1.0
+    ) -> tuple[torch.Tensor, torch.Tensor]:
+        """Centres, and a share of the radii, in scene units, on so many pixels of a canvas of this size."""
+        centers = (self.centers / torch.tensor([width, height]) - 0.5) * torch.tensor(size)
+        return centers, self.radii * share * (size[0] / width)
+
 
 class Missing(NamedTuple):
     """What a picture [C, H, W] lacks, where colours are added; each pixel's error times `weights` [H, W] matters."""
@@ -90,6 +97,15 @@ class Painted(NamedTuple):
     def amount(self, color: torch.Tensor) -> torch.Tensor:
         """Of a disc in that of the Gaussian that stands for it."""
         return color
+
+
+def canvas_of(
+    image: torch.Tensor, target: torch.Tensor, weights: torch.Tensor | None, added: bool
+) -> Missing | Painted:
+    """An image and its target [C, H, W] to look for discs that are added, or laid over it; on the CPU."""
+    image, target = image.detach().cpu(), target.cpu()
+    weights = torch.ones(target.shape[1:]) if weights is None else weights.cpu()
+    return Missing(target - image, weights) if added else Painted(image.clone(), target, weights)
 
 
 def find_discs(canvas: Missing | Painted, count: int) -> Discs:

@@ -14,7 +14,7 @@ from ..scene import Scene
 from ..units import COLOR, Placed
 from .initialization import start_of
 from .joining import Search
-from .matching_pursuit import Discs, Missing, Painted, find_discs
+from .matching_pursuit import Discs, canvas_of, find_discs
 from .surroundings import Surroundings, View
 
 STEPS = 12
@@ -38,20 +38,13 @@ def _best_disc(scene: SceneTensors, view: View) -> Discs:
     """That of matching pursuit; none where nothing would help."""
     channels, height, width = view.target.shape
     image = fused.composite(scene, width, height, channels)
-    weights = torch.ones(height, width) if view.weights is None else view.weights
-    is_added = COMPOSITING[scene.compositing].signed
-    canvas = (
-        Missing(view.target - image, weights) if is_added else Painted(image.clone(), view.target, weights)
-    )
-    return find_discs(canvas, 1)
+    return find_discs(canvas_of(image, view.target, view.weights, COMPOSITING[scene.compositing].signed), 1)
 
 
 def _layer(discs: Discs, scene: SceneTensors, view: View, search: Search) -> Group:
     """A layer of one shape, of the first kind there may be, in the place of a disc."""
     _, height, width = view.target.shape
-    side = scene.size[0] / width
-    centers = (discs.centers / torch.tensor([width, height]) - 0.5) * torch.tensor(scene.size)
-    radii = discs.radii * side
+    centers, radii = discs.placed(width, height, scene.size)
     opacity, falloff = LOOK
     low, high = search.falloff
     looks = {
