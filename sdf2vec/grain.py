@@ -24,10 +24,10 @@ class Grain(NamedTuple):
 
 
 GRAINS = (  # finest first
-    Grain(1024, 20, 255, 100, 0.2),
-    Grain(512, 12, 255, 20, 0.2),
-    Grain(256, 8, 51, 10, 0.3),
-    Grain(160, 3, 15, 10, 0.5),
+    Grain(1024, 20, 255, 100, 0.8),
+    Grain(512, 12, 255, 20, 0.6),
+    Grain(256, 8, 51, 10, 1.0),
+    Grain(160, 3, 15, 10, 2.0),
 )
 DENSE = GRAINS[2]  # more shapes of it say more of a picture than fewer finer ones, or yet more coarser ones
 USUAL = GRAINS[1::-1]  # what is tried where no size is asked for, smallest first

@@ -31,6 +31,7 @@ from .display import (
     RadialGradient,
     Stop,
 )
+from .filter_regions import Region, region_of, rounding_of, shared_regions
 from .outlines import convex, sides
 
 Element = Any  # svgwrite has no types
@@ -39,29 +40,7 @@ Attributes = dict[str, str | None]
 PREFIX = "@@"  # of ids, until the content that makes it is known
 NEEDLESS = ("version", "baseProfile", "xmlns:ev", "xmlns:xlink")  # that svgwrite puts at the root
 SHARED = ("fill", "fill-rule", "shape-rendering")  # attributes that a group says for all its items
-REACH = 3.0  # standard deviations that a blur reaches
 FLAT = 0.05  # user units: a rounding below it is none
-MARGINS = (
-    0.1,
-    0.2,
-    0.3,
-    0.45,
-    0.6,
-    0.8,
-    1.1,
-    1.5,
-    2.0,
-    3.0,
-    4.5,
-    7.0,
-    10.0,
-    20.0,
-    50.0,
-    100.0,
-    200.0,
-    500.0,
-    1e3,
-)
 STROKES = {"fill": "currentColor", "stroke": "currentColor", "stroke-width": "0", "stroke-linejoin": "round"}
 
 
@@ -106,7 +85,7 @@ class _Writer:
         self.ids: dict[str, str] = {}
         self.classes: dict[str, str] = {}
         self.roundings = _usual_roundings(drawing.items)
-        self.margins = _margins(drawing, style.filter) if style.compact else {}
+        self.regions = shared_regions(drawing, style.filter) if style.compact else {}
 
     def text(self) -> str:
         """The document without its title, ids with PREFIX."""
@@ -150,7 +129,7 @@ class _Writer:
             return self._painted(figure)
         assert isinstance(figure.fill, tuple)
         look: Attributes = {"color": color_text(figure.fill), "opacity": opacity_text(figure.opacity)}
-        rounding = _rounding(figure)
+        rounding = rounding_of(figure)
         stroke = self.number(2.0 * rounding) if rounding else None
         if figure.blur:
             usual = stroke and rounding == self.roundings.get(figure.blur)
@@ -215,28 +194,17 @@ class _Writer:
         return self._defined("g", gradient)
 
     def _filter(self, figure: Figure) -> str:
-        """A blur, in a region in shares of the element's box, so that figures can share it.
+        """A blur, in a region that other figures can share.
 
         The opacity is part of it, for browsers round an attribute's down; not of a class, which all opacities share.
         """
-        across, down = self._margins(figure)
-        region = {"x": number(-across, 2), "y": number(-down, 2)}
-        size = {"width": number(1.0 + 2.0 * across, 2), "height": number(1.0 + 2.0 * down, 2)}
-        made = self.svg.filter(color_interpolation_filters="sRGB", **region, **size)
+        region = self.regions[figure] if self.style.compact else region_of(figure)
+        made = self.svg.filter(color_interpolation_filters="sRGB", **_attributes(region))
         made.feGaussianBlur(None, stdDeviation=self.fine(figure.blur))
         opacity = opacity_text(figure.opacity)
         if opacity is not None and not self.style.compact:
             made.feComponentTransfer(None).feFuncA("linear", slope=opacity)
         return self._defined("b", made)
-
-    def _margins(self, figure: Figure) -> tuple[float, float]:
-        """How far a blur reaches beyond an element's box, in its sides."""
-        rounding = _rounding(figure)
-        if self.style.compact:
-            return (_least(self.margins[figure.blur], float(_margin(figure, rounding).max())),) * 2
-        wanted = REACH * figure.blur / np.maximum(box_of(figure.geometry) + 2.0 * rounding, 0.1)
-        across, down = (_least(MARGINS, share) for share in wanted.tolist())
-        return across, down
 
     def _defined(self, letter: str, definition: Element) -> str:
         """A reference to a definition; the same one as before for equal content."""
@@ -338,64 +306,17 @@ class _Writer:
         return number(value, self.drawing.digits + 2)
 
 
-def _rounding(figure: Figure) -> float:
-    return figure.geometry.rounding if isinstance(figure.geometry, PolygonOutline) else 0.0
-
-
-def _margin(figure: Figure, rounding: float) -> Points:
-    """How far a blurred element reaches beyond its box [2], in its sides, where its rounding is a stroke."""
-    return np.asarray((REACH * figure.blur + rounding) / np.maximum(box_of(figure.geometry), 0.1))
-
-
-def _least(margins: Sequence[float], share: float) -> float:
-    return next((step for step in margins if step >= share), margins[-1])
-
-
-def _margins(drawing: Drawing, worth: float) -> dict[float, tuple[float, ...]]:
-    """For each blur the margins of its filters: as few as the pixels that a renderer blurs in vain are worth."""
-    figures = [item for item in drawing.items if isinstance(item, Figure) and item.blur]
-    by_blur: dict[float, list[Figure]] = {}
-    for figure in figures:
-        by_blur.setdefault(figure.blur, []).append(figure)
-    canvas = drawing.width * drawing.height
-    return {blur: _shared_margins(members, canvas, worth) for blur, members in by_blur.items()}
-
-
-def _shared_margins(figures: Sequence[Figure], canvas: float, worth: float) -> tuple[float, ...]:
-    """The margins of some figures of one blur, each shared by figures that want nearly as much; the cheapest ones.
-
-    By dynamic programming over the figures in the order of what they want: of each run the largest.
-    """
-    wanted = sorted(((float(_margin(f, _rounding(f)).max()), f) for f in figures), key=lambda pair: pair[0])
-    steps = [_least(MARGINS, share) for share, _ in wanted]
-    boxes = np.array([np.maximum(box_of(figure.geometry), 0.1) for _, figure in wanted])
-    cheapest: list[tuple[float, tuple[float, ...]]] = [(0.0, ())]
-    for end in range(1, len(steps) + 1):
-        regions = np.minimum(np.prod(boxes[:end] * (1.0 + 2.0 * steps[end - 1]), axis=1), canvas)
-        costs = np.cumsum(regions[::-1])[::-1] + worth * canvas
-        found = [(cheapest[start][0] + costs[start], start) for start in range(end)]
-        cost, start = min(found)
-        cheapest.append((cost, (*cheapest[start][1], steps[end - 1])))
-    return cheapest[-1][1]
+def _attributes(region: Region) -> dict[str, str]:
+    names = ("x", "y", "width", "height")
+    box = {name: number(value, 2) for name, value in zip(names, region[:4], strict=True)}
+    return box | ({"filterUnits": "userSpaceOnUse"} if region.in_user_units else {})
 
 
 def _usual_roundings(items: Sequence[Item]) -> dict[float, float]:
     """For each blur the rounding that most of its figures have."""
     figures = [item for item in items if isinstance(item, Figure)]
-    counted = Counter((figure.blur, _rounding(figure)) for figure in figures if _rounding(figure))
+    counted = Counter((figure.blur, rounding_of(figure)) for figure in figures if rounding_of(figure))
     return {blur: rounding for (blur, rounding), _ in reversed(counted.most_common())}
-
-
-def box_of(geometry: Geometry) -> Points:
-    """Width and height [2] of a geometry in its own frame, without a polygon's rounding."""
-    if isinstance(geometry, EllipseOutline):
-        return 2.0 * np.array(geometry.radii)
-    if isinstance(geometry, RectangleOutline):
-        return 2.0 * np.array(geometry.half_size)
-    if isinstance(geometry, PolygonOutline):
-        return np.asarray(np.ptp(np.array(geometry.points), axis=0))
-    points = [point for contour in geometry.contours for segment in contour.segments for point in segment]
-    return np.asarray(np.ptp(np.array(points), axis=0))
 
 
 def number(value: float, digits: int) -> str:

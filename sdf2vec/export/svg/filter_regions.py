@@ -1,0 +1,159 @@
+"""The regions of blur filters: few of them, in which renderers blur few pixels in vain."""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+
+from ...outlines import EllipseOutline, PolygonOutline, RectangleOutline
+from .canvas import Points
+from .display import Drawing, Figure, Geometry, Path
+
+REACH = 3.0  # standard deviations that a blur reaches
+SMALLEST = 0.1  # user units: no box is taken for smaller
+MARGINS = (
+    0.1,
+    0.2,
+    0.3,
+    0.45,
+    0.6,
+    0.8,
+    1.1,
+    1.5,
+    2.0,
+    3.0,
+    4.5,
+    7.0,
+    10.0,
+    20.0,
+    50.0,
+    100.0,
+    200.0,
+    500.0,
+    1e3,
+)
+
+
+class Region(NamedTuple):
+    """Where a filter works: in shares of the element's box, or in user units."""
+
+    left: float
+    top: float
+    width: float
+    height: float
+    in_user_units: bool = False
+
+    @property
+    def area(self) -> float:
+        return self.width * self.height
+
+    @classmethod
+    def around(cls, across: float, down: float) -> Region:
+        """An element's box with such margins, in its sides."""
+        return cls(-across, -down, 1.0 + 2.0 * across, 1.0 + 2.0 * down)
+
+    @classmethod
+    def of_canvas(cls, drawing: Drawing, blur: float) -> Region:
+        """All that a blur can bring into the canvas."""
+        reach = math.ceil(REACH * blur)
+        return cls(-reach, -reach, drawing.width + 2 * reach, drawing.height + 2 * reach, True)
+
+
+def region_of(figure: Figure) -> Region:
+    """The box of a figure and what its blur reaches, each side for itself."""
+    wanted = REACH * figure.blur / np.maximum(box_of(figure.geometry) + 2.0 * rounding_of(figure), SMALLEST)
+    return Region.around(*map(_least, wanted.tolist()))
+
+
+def shared_regions(drawing: Drawing, worth: float) -> dict[Figure, Region]:
+    """For each blurred figure a region that others of its blur share, its rounding being a stroke.
+
+    One filter more is worth blurring this share of the canvas' pixels in vain.
+    """
+    by_blur: dict[float, list[Figure]] = {}
+    for item in drawing.items:
+        if isinstance(item, Figure) and item.blur:
+            by_blur.setdefault(item.blur, []).append(item)
+    found: dict[Figure, Region] = {}
+    for blur, figures in by_blur.items():
+        canvas = Region.of_canvas(drawing, blur)
+        for shared in _merged([*map(_alone, figures)], canvas, worth * drawing.width * drawing.height):
+            found |= dict.fromkeys(shared.figures, shared.region(canvas))
+    return found
+
+
+class _Shared(NamedTuple):
+    """Figures of one filter: the margins of their boxes [2] in their sides, the boxes' area, the number of figures.
+
+    That is infinite where the canvas can't be their region.
+    """
+
+    figures: tuple[Figure, ...]
+    margins: Points
+    area: float
+    number: float
+
+    def __or__(self, other: _Shared) -> _Shared:
+        margins = np.maximum(self.margins, other.margins)
+        return _Shared(
+            self.figures + other.figures, margins, self.area + other.area, self.number + other.number
+        )
+
+    def region(self, canvas: Region) -> Region:
+        """The cheaper one."""
+        around = Region.around(*self.margins.tolist())
+        return around if self.area * around.area <= self.number * canvas.area else canvas
+
+
+def _alone(figure: Figure) -> _Shared:
+    """A filter of its own."""
+    box = np.maximum(box_of(figure.geometry), SMALLEST)
+    margins = _rounded_up((REACH * figure.blur + rounding_of(figure)) / box)
+    number = 1.0 if isinstance(figure.geometry, PolygonOutline | Path) else math.inf
+    return _Shared((figure,), margins, float(box.prod()), number)
+
+
+def _rounded_up(margins: Points) -> Points:
+    """To two digits."""
+    step = 10.0 ** np.maximum(np.floor(np.log10(margins)) - 1.0, -2.0)
+    return np.asarray(np.ceil(margins / step) * step)
+
+
+def _merged(groups: list[_Shared], canvas: Region, price: float) -> list[_Shared]:
+    """Two become one, those first that save most, while a filter costs more than the pixels blurred in vain."""
+    while len(groups) > 1:
+        margins, areas, counts = (np.array(column) for column in list(zip(*groups, strict=True))[1:])
+        alone = np.minimum(areas * np.prod(1.0 + 2.0 * margins, axis=-1), counts * canvas.area)
+        wider = np.prod(1.0 + 2.0 * np.maximum(margins[:, None], margins), axis=-1)
+        both = np.minimum((areas[:, None] + areas) * wider, (counts[:, None] + counts) * canvas.area)
+        saved = price + alone[:, None] + alone - both
+        np.fill_diagonal(saved, -math.inf)
+        first, second = divmod(int(saved.argmax()), len(groups))
+        if saved[first, second] <= 0:
+            break
+        rest = [group for index, group in enumerate(groups) if index not in (first, second)]
+        groups = [*rest, groups[first] | groups[second]]
+    return groups
+
+
+def _least(share: float) -> float:
+    return next((step for step in MARGINS if step >= share), MARGINS[-1])
+
+
+def rounding_of(figure: Figure) -> float:
+    """The rounding of a polygon, in user units; of all else none."""
+    return figure.geometry.rounding if isinstance(figure.geometry, PolygonOutline) else 0.0
+
+
+def box_of(geometry: Geometry) -> Points:
+    """Width and height [2] of a geometry in its own frame, without a polygon's rounding."""
+    if isinstance(geometry, EllipseOutline):
+        return 2.0 * np.array(geometry.radii)
+    if isinstance(geometry, RectangleOutline):
+        return 2.0 * np.array(geometry.half_size)
+    if isinstance(geometry, PolygonOutline):
+        return np.asarray(np.ptp(np.array(geometry.points), axis=0))
+    points = [point for contour in geometry.contours for segment in contour.segments for point in segment]
+    return np.asarray(np.ptp(np.array(points), axis=0))
