@@ -40,6 +40,7 @@ SMALL, SMALL_LIMIT = (
 )  # of a small SVG, in dB: it is near the picture, not the render
 FINER = 4  # times across: a canvas whose means stand for what covers each pixel
 LARGEST_FITTED = 512  # shortest side at which the fitted size is checked
+QUICK_WORK = 2e7  # shapes times pixels of a shader that is drawn right after an export
 
 
 @dataclass(frozen=True)
@@ -165,6 +166,12 @@ def default_sizes(scene: Scene, trip: RoundTrip) -> list[Size]:
     return [(width, height), (2 * width, 2 * height), _small(width, height)]
 
 
+def _within(pixels: float, width: int, height: int) -> Size:
+    """A canvas of this shape and at most about so many pixels."""
+    share = min(1.0, math.sqrt(pixels / (width * height)))
+    return fitted_size(width, height, max(1, int(min(width, height) * share)))
+
+
 def _small(width: int, height: int) -> Size:
     """A small canvas of exactly the same shape."""
     common = math.gcd(width, height)
@@ -193,7 +200,7 @@ def _limit(scene: Scene, width: int, height: int) -> float:
 
 
 def figure(scene: Scene, target: str, made: Exported, options: Options) -> Check | None:
-    """An export at the fitted size on the first quick engine that draws it; None where none is here.
+    """An export at the fitted size (a shader of many shapes: smaller) on the first quick engine; None where none is.
 
     None too for one that shows something else than the render: a moving picture, or a part of it.
     """
@@ -203,6 +210,8 @@ def figure(scene: Scene, target: str, made: Exported, options: Options) -> Check
         engine, suits = ENGINES[trip.engine], trip.profile in (None, options.svg_profile)
         if suits and engine.is_quick and not engine.missing():
             size = default_sizes(scene, trip)[0]
+            if trip.profile is None:
+                size = _within(QUICK_WORK / max(1, scene.shape_count), *size)
             return compare(trip, made, scene, size, draw_fast(scene, *size))
     return None
 

@@ -1,6 +1,7 @@
 """What the engines have in common: their record, their error and their checks."""
 
 import io
+import os
 import shutil
 import subprocess
 from collections.abc import Callable, Mapping, Sequence
@@ -81,10 +82,15 @@ def reason_missing(probe: Callable[[], object], advice: str) -> str | None:
     return None
 
 
-def load_triton() -> None:
-    """Loads Triton where it is installed: its LLVM crashes when a Mesa driver has brought another one before."""
+def prepare_mesa() -> None:
+    """Before one of Mesa's drivers is loaded.
+
+    Triton comes first where it is installed: its LLVM crashes when a driver has brought another one before. Shaders are
+    drawn once, so that a software driver's LLVM should not optimise them: that takes longer than all else.
+    """
     with suppress(ImportError):
         import_module("triton")
+    os.environ.setdefault("GALLIVM_PERF", "nopt")
 
 
 def require_drawable(width: int, height: int) -> None:

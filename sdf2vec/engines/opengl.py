@@ -10,7 +10,7 @@ from typing import Any
 import moderngl
 import numpy as np
 
-from sdf2vec.engines.engine import EngineError, Picture, Uniforms, load_triton
+from sdf2vec.engines.engine import EngineError, Picture, Uniforms, prepare_mesa
 
 # Three corners of a triangle that covers the screen; `gl_VertexID` makes buffers needless.
 VERTEX_SHADER = """{version}
@@ -29,7 +29,7 @@ ERROR_LINE = re.compile(
 @cache
 def probe() -> Any:
     """The context. Raises where OpenGL does not work."""
-    load_triton()
+    prepare_mesa()
     settings: dict[str, Any] = {"backend": "egl"}
     return moderngl.create_context(standalone=True, **settings)
 

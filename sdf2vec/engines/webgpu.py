@@ -12,7 +12,7 @@ from typing import Any, NamedTuple
 import numpy as np
 import wgpu
 
-from sdf2vec.engines.engine import EngineError, Picture, Uniforms, load_triton
+from sdf2vec.engines.engine import EngineError, Picture, Uniforms, prepare_mesa
 
 TARGET_FORMAT = "rgba32float"
 
@@ -44,7 +44,7 @@ class Binding(NamedTuple):
 @cache
 def probe() -> Any:
     """The device. Raises where WebGPU does not work."""
-    load_triton()
+    prepare_mesa()
     with _runtime_folder():
         return wgpu.gpu.request_adapter_sync().request_device_sync()
 
