@@ -29,8 +29,8 @@ from .views import scaled
 Views = Callable[[float], View]  # a picture at any resolution
 Kept = Mapping[Slot, torch.Tensor]  # numbers [G, width] that stay where they are; NaN for what does not yet
 PHASES = (
-    Phase("settling", 60, 256, rate=0.15, end_rate=0.09, loss=MSE),
-    Phase("settling", 60, 320, rate=0.09, end_rate=0.04, loss=MSE),
+    Phase("settling", 100, 256, rate=0.15, end_rate=0.09, loss=MSE),
+    Phase("settling", 100, 320, rate=0.09, end_rate=0.04, loss=MSE),
 )
 DUE = {  # from which share of the steps on numbers of a precision settle, and when all have
     "place": (0.0, 0.6),

@@ -13,27 +13,7 @@ from .display import Drawing, Figure, Geometry, Path
 
 REACH = 3.0  # standard deviations that a blur reaches
 SMALLEST = 0.1  # user units: no box is taken for smaller
-MARGINS = (
-    0.1,
-    0.2,
-    0.3,
-    0.45,
-    0.6,
-    0.8,
-    1.1,
-    1.5,
-    2.0,
-    3.0,
-    4.5,
-    7.0,
-    10.0,
-    20.0,
-    50.0,
-    100.0,
-    200.0,
-    500.0,
-    1e3,
-)
+MARGINS = (0.1, 0.2, 0.3, 0.45, 0.6, 0.8, 1.1, 1.5, 2, 3, 4.5, 7, 10, 20, 50, 100, 200, 500, 1000)
 
 
 class Region(NamedTuple):
