@@ -25,7 +25,7 @@ from .outlines import Traced, core, distance_to, edge_of, sharpened
 from .refit_appearance import Difference
 from .sampling import SampleGrid, covers, distances, extent, grid_over
 
-SHARES = (1.0, 0.7, 0.45, 0.2)  # of the corner radius that an offset outline has
+SHARES = (1.0, 0.7, 0.45, 0.2)  # of the corner radius that an offset outline has; all of it first
 WIDTHS = (0.9, 1.0, 1.1)  # of the Gaussian
 # Standard deviations in user units, few so that shapes can share filters. At these the three boxes of the standard
 # (librsvg, browsers on the CPU) and resvg's five are near to a Gaussian (browsers on a GPU), at twice the size as well.
@@ -69,9 +69,14 @@ def best_blur(layer: Layer, canvas: Canvas) -> Blurred | None:
     if core(outline) is None:
         return None
     trial = trial_of(layer, canvas)
-    shares = [sharpened(outline, share) for share in SHARES]
-    best = min(shares, key=lambda tried: trial.blurred(tried, 1.0).error)
-    return nearest([trial.plain(outline), *(trial.blurred(best, width) for width in WIDTHS)])
+    made = [sharpened(outline, share) for share in SHARES]
+    edges = [(sharp, distance_to(sharp, trial.grid)) for sharp in made]
+    usual = trial.deviation(1.0)
+    blurs = [trial.judged(*edge, usual) for edge in edges]
+    best = min(range(len(blurs)), key=lambda index: blurs[index].error)
+    others = sorted({trial.deviation(width) for width in WIDTHS} - {usual})
+    plain = trial.judged(outline, edges[0][1], 0.0)
+    return nearest([plain, blurs[best], *(trial.judged(*edges[best], other) for other in others)])
 
 
 def _traced(layer: Layer, canvas: Canvas) -> Blurred | None:
@@ -111,23 +116,16 @@ class Trial:
     seen: BoolArray  # [Y, X]
     unit: float
 
-    def blurred(self, outline: Outline, width: float) -> Blurred:
-        """An outline whose blur is so many times as wide as the falloff asks for."""
-        return self.judged(outline, distance_to(outline, self.grid), self._deviation(width))
-
-    def plain(self, outline: Outline) -> Blurred:
-        """An outline without a blur."""
-        return self.judged(outline, distance_to(outline, self.grid), 0.0)
-
     def moved(self, field: Float64Array, width: float) -> Iterator[Blurred]:
         """Contours of a field [Y, X] where it is 0, each nearer to where coverage is one half once it is blurred."""
-        deviation = self._deviation(width)
+        deviation = self.deviation(width)
         for _ in range(MOVES):
             found = self.judged(Traced(tuple(contours(field, 0.0, self.grid))), field, deviation)
             yield found
             field = field + found.difference.off * deviation * math.sqrt(math.tau)
 
-    def _deviation(self, width: float) -> float:
+    def deviation(self, width: float) -> float:
+        """Of a blur so many times as wide as the falloff asks for."""
         wanted = width * EDGE_DEVIATION * self.falloff * self.unit
         return quantised(max(wanted, LEAST)) / self.unit
 

@@ -164,12 +164,14 @@ def distance_to(outline: Outline | Traced, grid: SampleGrid) -> Float64Array:
     corners = convex(points)
     if len(corners) == 1:
         return np.asarray(np.hypot(x - corners[0, 0], y - corners[0, 1])) - rounding
-    nearest = np.full((len(grid.y), len(grid.x)), np.inf)
-    inside = np.full(nearest.shape, len(corners) > 2)
+    squared = np.full((len(grid.y), len(grid.x)), np.inf)
+    inside = np.full(squared.shape, len(corners) > 2)
     for a, b, normal in sides(corners):
         px, py = x - a[0], y - a[1]
         edge = b - a
         along = np.clip((px * edge[0] + py * edge[1]) / max(float(edge @ edge), FLAT**2), 0.0, 1.0)
-        nearest = np.minimum(nearest, np.hypot(px - along * edge[0], py - along * edge[1]))
+        to_side = np.square(px - along * edge[0]) + np.square(py - along * edge[1])
+        squared = np.minimum(squared, to_side, out=squared)
         inside &= px * normal[0] + py * normal[1] <= 0.0
+    nearest = np.sqrt(squared, out=squared)
     return np.asarray(np.where(inside, -nearest, nearest)) - rounding

@@ -68,9 +68,11 @@ def steps_over(alphas: NDArray[Float], colors: Float64Array, ground: Float64Arra
     """
     below = np.repeat(ground[:, None], alphas.shape[1], axis=1)
     for alpha, color in zip(alphas, colors, strict=True):
-        own = np.concatenate([np.broadcast_to(color, (3, len(alpha))), np.ones((1, len(alpha)))])
-        yield (step := own - below)
-        below = below + step * alpha
+        step = np.empty_like(below)
+        np.subtract(color, below[:3], out=step[:3])
+        np.subtract(1.0, below[3], out=step[3])
+        yield step
+        below += step * alpha
 
 
 def layers_at(scene: Scene) -> LayerSamples:
