@@ -11,6 +11,7 @@ from sdf2vec import Layer, Scene, Shape, blend, exports, roundtrip
 from sdf2vec.engines import ENGINES, glslang_validate
 from sdf2vec.export import EXPORTERS
 from sdf2vec.export.exported import Exported
+from sdf2vec.export.options import Options
 from sdf2vec.lower.shader import literal
 from sdf2vec.roundtrip import ROUND_TRIPS, compare
 from sdf2vec.shapes import KINDS
@@ -243,3 +244,23 @@ def test_a_written_drawing_without_filters_is_judged_by_every_renderer(require_e
     assert {r.target for r in found} == {"svg portable"}
     assert {r.engine for r in found} == {"resvg", "cairosvg"}
     assert "svg portable on resvg" in names
+
+
+@pytest.mark.parametrize(("target", "engine", "smaller"), [("glsl", "opengl", True), ("svg", "resvg", False)])
+def test_a_shader_of_many_shapes_is_drawn_smaller_after_its_export(
+    target, engine, smaller, require_engine, monkeypatch
+):
+    require_engine(engine)
+    sizes: list[tuple[int, int]] = []
+    monkeypatch.setattr(roundtrip, "compare", lambda trip, made, scene, size, expected: sizes.append(size))
+    monkeypatch.setattr(roundtrip, "QUICK_WORK", 2e5)
+    for layers in (2, 50):
+        scene = random_scene(("circle",), layers=layers, width=300, height=200, joins=())
+        roundtrip.figure(scene, target, Exported(""), Options())
+    assert sizes[0] == (300, 200)
+    width, height = sizes[1]
+    if smaller:
+        assert width / height == pytest.approx(1.5, rel=0.05)
+        assert 0.9 * 2e5 / 50 <= width * height <= 2e5 / 50 * 1.02
+    else:
+        assert (width, height) == (300, 200)
