@@ -72,11 +72,11 @@ def best_blur(layer: Layer, canvas: Canvas) -> Blurred | None:
     made = [sharpened(outline, share) for share in SHARES]
     edges = [(sharp, distance_to(sharp, trial.grid)) for sharp in made]
     usual = trial.deviation(1.0)
-    blurs = [trial.judged(*edge, usual) for edge in edges]
-    best = min(range(len(blurs)), key=lambda index: blurs[index].error)
+    blurs = [trial.judged(*tried, usual) for tried in edges]
+    best, edge = min(zip(blurs, edges, strict=True), key=lambda pair: pair[0].error)
     others = sorted({trial.deviation(width) for width in WIDTHS} - {usual})
     plain = trial.judged(outline, edges[0][1], 0.0)
-    return nearest([plain, blurs[best], *(trial.judged(*edges[best], other) for other in others)])
+    return nearest([plain, best, *(trial.judged(*edge, other) for other in others)])
 
 
 def _traced(layer: Layer, canvas: Canvas) -> Blurred | None:

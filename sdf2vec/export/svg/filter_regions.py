@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -13,6 +14,7 @@ from .display import Drawing, Figure, Geometry, Path
 
 REACH = 3.0  # standard deviations that a blur reaches
 SMALLEST = 0.1  # user units: no box is taken for smaller
+MOST = 128  # different margins of figures of one blur; of more, those are told apart that are of other steps
 MARGINS = (0.1, 0.2, 0.3, 0.45, 0.6, 0.8, 1.1, 1.5, 2, 3, 4.5, 7, 10, 20, 50, 100, 200, 500, 1000)
 
 
@@ -27,6 +29,7 @@ class Region(NamedTuple):
 
     @property
     def area(self) -> float:
+        """In squares of the units that it is in."""
         return self.width * self.height
 
     @classmethod
@@ -44,7 +47,7 @@ class Region(NamedTuple):
 def region_of(figure: Figure) -> Region:
     """The box of a figure and what its blur reaches, each side for itself."""
     wanted = REACH * figure.blur / np.maximum(box_of(figure.geometry) + 2.0 * rounding_of(figure), SMALLEST)
-    return Region.around(*map(_least, wanted.tolist()))
+    return Region.around(*_stepped(wanted).tolist())
 
 
 def shared_regions(drawing: Drawing, worth: float) -> dict[Figure, Region]:
@@ -59,7 +62,7 @@ def shared_regions(drawing: Drawing, worth: float) -> dict[Figure, Region]:
     found: dict[Figure, Region] = {}
     for blur, figures in by_blur.items():
         canvas = Region.of_canvas(drawing, blur)
-        for shared in _merged([*map(_alone, figures)], canvas, worth * drawing.width * drawing.height):
+        for shared in _merged(_alike(figures), canvas, worth * drawing.width * drawing.height):
             found |= dict.fromkeys(shared.figures, shared.region(canvas))
     return found
 
@@ -77,9 +80,8 @@ class _Shared(NamedTuple):
 
     def __or__(self, other: _Shared) -> _Shared:
         margins = np.maximum(self.margins, other.margins)
-        return _Shared(
-            self.figures + other.figures, margins, self.area + other.area, self.number + other.number
-        )
+        area, number = self.area + other.area, self.number + other.number
+        return _Shared(self.figures + other.figures, margins, area, number)
 
     def region(self, canvas: Region) -> Region:
         """The cheaper one."""
@@ -87,12 +89,21 @@ class _Shared(NamedTuple):
         return around if self.area * around.area <= self.number * canvas.area else canvas
 
 
-def _alone(figure: Figure) -> _Shared:
-    """A filter of its own."""
-    box = np.maximum(box_of(figure.geometry), SMALLEST)
-    margins = _rounded_up((REACH * figure.blur + rounding_of(figure)) / box)
-    number = 1.0 if isinstance(figure.geometry, PolygonOutline | Path) else math.inf
-    return _Shared((figure,), margins, float(box.prod()), number)
+def _alike(figures: Sequence[Figure]) -> list[_Shared]:
+    """Figures that want the same margins, together, if the canvas can be the region of all or of none."""
+    boxes = [np.maximum(box_of(figure.geometry), SMALLEST) for figure in figures]
+    wanted = [
+        (REACH * figure.blur + rounding_of(figure)) / box for figure, box in zip(figures, boxes, strict=True)
+    ]
+    margins = _rounded_up(np.array(wanted))
+    if len(np.unique(margins, axis=0)) > MOST:
+        margins = _stepped(np.array(wanted))
+    found: dict[tuple[float, ...], _Shared] = {}
+    for figure, box, own in zip(figures, boxes, margins, strict=True):
+        number = 1.0 if isinstance(figure.geometry, PolygonOutline | Path) else math.inf
+        one, key = _Shared((figure,), own, float(box.prod()), number), (number, *own.tolist())
+        found[key] = found[key] | one if key in found else one
+    return list(found.values())
 
 
 def _rounded_up(margins: Points) -> Points:
@@ -101,13 +112,24 @@ def _rounded_up(margins: Points) -> Points:
     return np.asarray(np.ceil(margins / step) * step)
 
 
+def _stepped(margins: Points) -> Points:
+    """The next one of MARGINS for each."""
+    return np.array(MARGINS)[np.minimum(np.searchsorted(MARGINS, margins), len(MARGINS) - 1)]
+
+
 def _merged(groups: list[_Shared], canvas: Region, price: float) -> list[_Shared]:
     """Two become one, those first that save most, while a filter costs more than the pixels blurred in vain."""
+
+    def pixels(margins: Points, areas: Points, numbers: Points) -> Points:
+        around = areas * np.prod(1.0 + 2.0 * margins, axis=-1)
+        return np.asarray(np.minimum(around, numbers * canvas.area))
+
     while len(groups) > 1:
-        margins, areas, counts = (np.array(column) for column in list(zip(*groups, strict=True))[1:])
-        alone = np.minimum(areas * np.prod(1.0 + 2.0 * margins, axis=-1), counts * canvas.area)
-        wider = np.prod(1.0 + 2.0 * np.maximum(margins[:, None], margins), axis=-1)
-        both = np.minimum((areas[:, None] + areas) * wider, (counts[:, None] + counts) * canvas.area)
+        _, *columns = zip(*groups, strict=True)
+        margins, areas, numbers = map(np.array, columns)
+        alone = pixels(margins, areas, numbers)
+        wider = np.maximum(margins[:, None], margins)
+        both = pixels(wider, areas[:, None] + areas, numbers[:, None] + numbers)
         saved = price + alone[:, None] + alone - both
         np.fill_diagonal(saved, -math.inf)
         first, second = divmod(int(saved.argmax()), len(groups))
@@ -116,10 +138,6 @@ def _merged(groups: list[_Shared], canvas: Region, price: float) -> list[_Shared
         rest = [group for index, group in enumerate(groups) if index not in (first, second)]
         groups = [*rest, groups[first] | groups[second]]
     return groups
-
-
-def _least(share: float) -> float:
-    return next((step for step in MARGINS if step >= share), MARGINS[-1])
 
 
 def rounding_of(figure: Figure) -> float:

@@ -55,3 +55,12 @@ def test_blurs_share_nothing() -> None:
     first, second = regions(*figures, worth=math.inf)
     assert first.left == pytest.approx(-0.3)
     assert second.left == pytest.approx(-0.45)
+
+
+def test_very_many_figures_are_told_apart_by_fewer_steps() -> None:
+    boxes = np.random.default_rng(0).uniform(5.0, 90.0, (600, 2)).tolist()
+    figures = [Figure(polygon(*box), BLACK, blur=3.0) for box in boxes]
+    found = regions(*figures, worth=0.0)
+    assert len(set(found)) < 150
+    margins = -np.array([[region.left, region.top] for region in found]) * boxes
+    assert (margins >= 9.0 - 1e-9).all()
