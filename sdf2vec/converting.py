@@ -198,7 +198,7 @@ def write_exports(
 ) -> Written:
     """Writes the exports of a scene, by default titled after the input."""
     title = _title(job, options)
-    exports, written, met = Exports(scene, picture), 0, True
+    exports, written, met = Exports(scene, picture, teller.phase), 0, True
     sizes = dict[str, Size]()
     for target, path in job.outputs.items():
         chosen = replace(options, title=title, alone=path == STREAM)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from bisect import bisect_left
 from collections.abc import Callable, Iterator, Sequence
+from contextlib import AbstractContextManager, nullcontext
 from dataclasses import replace
 from functools import cache, cached_property, partial
 from typing import TYPE_CHECKING
@@ -41,7 +42,9 @@ STEP = 1.0  # dB between two tries of rounded numbers
 TRIES = 3
 DENSEST = 30.0  # dB from the render; more shapes so coarse say more of a picture than fewer finer ones
 
-_drawable: Callable[[Scene, Views, Grain], Scene] = deferred("sdf2vec.fit.drawable", "drawable")
+Phase = Callable[[str], AbstractContextManager[object]]
+
+_drawable: Callable[[Scene, Views, Grain, Scene | None], Scene] = deferred("sdf2vec.fit.drawable", "drawable")
 _rounded: Callable[[Scene, Grain], Scene] = deferred("sdf2vec.fit.drawable", "rounded")
 _settled: Callable[[Scene, StepsOf, Views], Scene] = deferred("sdf2vec.fit.settling", "settled")
 _views_of: Callable[[Picture], Views] = deferred("sdf2vec.fit.settling", "views_of")
@@ -54,10 +57,16 @@ class Exports:
     """The exports of one scene, fitted to a picture if that is given, else to what its render shows.
 
     What several need of it is fitted again once: the scene under `over`, and one that a small drawing can say.
+    `phase`: entered with the name of such a fit while it goes on.
     """
 
-    def __init__(self, scene: Scene, picture: Picture | None = None) -> None:
-        self.scene, self.picture = scene, picture
+    def __init__(
+        self,
+        scene: Scene,
+        picture: Picture | None = None,
+        phase: Phase | None = None,
+    ) -> None:
+        self.scene, self.picture, self._phase = scene, picture, phase or nullcontext
         self._drawn, self._near = cache(self._fit_small), cache(self._psnr)
 
     def export(self, target: str, options: Options | None = None) -> Exported:
@@ -73,6 +82,10 @@ class Exports:
         note = f"{target}: nothing can be added up {refusal}: fitted again under over{near}"
         made = self._made(exporter, scene, options)
         return replace(made, notes=(note, *made.notes))
+
+    def drawn(self, grain: Grain) -> Scene:
+        """The scene nearest to the picture that a small drawing of this grain can say."""
+        return self._drawn(self.scene, grain)
 
     def densest(self, target: str, options: Options) -> Exported:
         """The form of one export that says most with few bytes, about: its numbers are rounded, not fitted again."""
@@ -101,7 +114,8 @@ class Exports:
 
     @cached_property
     def _over(self) -> tuple[Scene, float]:
-        return _over_of(self.scene)
+        with self._phase("fit under over"):
+            return _over_of(self.scene)
 
     def _made(self, exporter: Exporter, scene: Scene, options: Options) -> Exported:
         """The finest that keeps to the size limit; where none does, the smallest."""
@@ -186,7 +200,9 @@ class Exports:
 
     def _fit_small(self, scene: Scene, grain: Grain) -> Scene:
         """The scene nearest to the picture that a drawing of this grain can say."""
-        return _drawable(scene, self._views, grain)
+        coarser = self._drawn(scene, USUAL[0]) if grain in USUAL[1:] else None
+        with self._phase("fit drawing"):
+            return _drawable(scene, self._views, grain, coarser)
 
     # --- rounded numbers ------------------------------------------------------------------------------------------
 
@@ -239,7 +255,9 @@ class Exports:
         made, found = rounded.write(scene)
         near = self._near(found)
         if near < enough:
-            again, found = rounded.write(_settled(scene, rounded.steps_of, self._views))
+            with self._phase("fit numbers"):
+                settled = _settled(scene, rounded.steps_of, self._views)
+            again, found = rounded.write(settled)
             made, near = max((made, near), (again, self._near(found)), key=lambda tried: tried[1])
         lost = _lost(self._near(scene) - near) if self.picture else f"{near:.1f} dB from the render"
         return replace(made, notes=(*made.notes, f"{exporter.suffix[1:]}: numbers rounded, {lost}")), near

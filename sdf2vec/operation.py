@@ -62,7 +62,7 @@ class Operation:
     glsl: Cell
     wgsl: Cell
     torch: str | None = None
-    llvm: str | None = None
+    python: str | None = None
     triton: str | None = None
     javascript: str | None = None
     value: Callable[..., float] | None = None

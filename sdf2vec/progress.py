@@ -37,6 +37,8 @@ class Teller:
     bar: Any = None
     task: Any = None
     seconds: dict[str, float] = field(default_factory=dict)  # of each phase
+    current: str = ""  # phase
+    within: float = 0.0  # seconds of phases within it
     which: str = ""  # of many pictures: "3/40 "
     lines: list[str] | None = None  # where they are kept to be said later
 
@@ -75,13 +77,18 @@ class Teller:
 
     @contextmanager
     def phase(self, name: str) -> Iterator[None]:
-        """A part of the work that has a name on the bar, and whose time is taken."""
-        started = time.perf_counter()
+        """A part of the work that has a name on the bar, and whose time is taken, less that of phases within it."""
+        started, (around, before) = time.perf_counter(), (self.current, self.within)
+        self.current, self.within = name, 0.0
         self.name(name)
         try:
             yield
         finally:
-            self.seconds[name] = self.seconds.get(name, 0.0) + time.perf_counter() - started
+            taken = time.perf_counter() - started
+            self.seconds[name] = self.seconds.get(name, 0.0) + taken - self.within
+            self.current, self.within = around, before + taken
+            if around:
+                self.name(around)
 
     def counted(self, done: int, everything: int) -> None:
         """Shows how many pictures are done."""

@@ -393,6 +393,19 @@ def test_importing_imports_nothing_heavy():
     assert done.stdout == "set()\n"
 
 
+def test_scenes_are_exported_as_text_without_torch():
+    code = """
+import sys, sdf2vec
+disc = sdf2vec.Shape.of("circle", (1, 0, 0), center=(0, 0), radius=0.2)
+scene = sdf2vec.Scene(40, 30, (sdf2vec.Layer((disc,), 0.1),))
+for target in ("svg", "glsl", "shadertoy", "wgsl", "three", "godot", "component"):
+    sdf2vec.export(scene, target)
+print("torch" in sys.modules)
+"""
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert done.stdout == "False\n"
+
+
 def test_everything_promised_is_there():
     assert all(hasattr(sdf2vec, name) for name in sdf2vec.__all__)
     assert issubclass(sdf2vec.SceneError, Sdf2vecError)

@@ -120,7 +120,7 @@ def test_every_row_is_complete_and_every_operation_has_a_meaning():
     for name, row in OPERATIONS.items():
         assert row.glsl.text, name
         assert row.wgsl.text, name
-        own = (row.torch, row.llvm, row.triton, row.value, row.partials)
+        own = (row.torch, row.python, row.triton, row.value, row.partials)
         assert all(own) != bool(row.expand), name
         assert any(own) == all(own), name
 

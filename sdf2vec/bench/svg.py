@@ -25,8 +25,6 @@ from ..export.options import Options
 from ..export.svg import small_svg
 from ..exports import Exports
 from ..files import write_atomically
-from ..fit.drawable import drawable
-from ..fit.settling import views_of
 from ..grain import GRAINS
 from ..image import Picture, load, premultiply
 from ..render.draw import draw
@@ -123,7 +121,7 @@ def rows(name: str, scene: Scene, picture: Picture, kind: str, profiles: list[st
 
 def _text(scene: Scene, picture: Picture, profile: str, name: str) -> str:
     if grain := SMALL.get(profile):
-        return str(small_svg(drawable(scene, views_of(picture), grain), Options(title=name), grain).data)
+        return str(small_svg(Exports(scene, picture).drawn(grain), Options(title=name), grain).data)
     text = Exports(scene).export("svg", Options(svg_profile=profile, title=name)).data
     assert isinstance(text, str)
     return text

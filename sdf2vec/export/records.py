@@ -9,23 +9,20 @@ from collections import defaultdict
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from functools import cache, cached_property
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
 from ..arrays import Float32Array, Float64Array, IntArray
 from ..blend import COMPOSITING, JOINS
-from ..deferred import deferred
 from ..expr import Expr, component, const, operation, select, var, vec3
 from ..graph import hoist, scalarize, substitute
 from ..layer import PIXEL, STILL, P, cover_of, shape_at
+from ..lower.numpy import Arrays, compile_numpy
 from ..operation import VEC4, VECTOR
 from ..paints import FLAT, PAINTS
 from ..scene import Layer, Scene, Shape
 from ..shapes import KINDS
-
-from_numpy: Callable[..., Any] = deferred("torch", "from_numpy")
-compile_torch: Callable[..., Callable[..., Any]] = deferred("sdf2vec.lower.torch", "compile_torch")
 
 OPACITY, FALLOFF, COUNT, SMOOTHNESS, JOIN = range(
     5
@@ -209,12 +206,12 @@ class _Tabulated:
     def values(self, shapes: Sequence[Shape]) -> Float64Array:
         """The numbers of the records of some shapes, [shapes, width]."""
         rows = np.array([(*s.color, *s.paint_parameters, *s.parameters) for s in shapes])
-        found = self._compiled(*from_numpy(np.ascontiguousarray(rows.T)))
-        return np.stack([np.broadcast_to(column.numpy(), len(shapes)) for column in found], axis=1)
+        found = self._compiled(*rows.T)
+        return np.stack([np.broadcast_to(column, len(shapes)) for column in found], axis=1)
 
     @cached_property
-    def _compiled(self) -> Callable[..., Any]:
-        return compile_torch(self.scalars, self._inputs)
+    def _compiled(self) -> Callable[..., Arrays]:
+        return compile_numpy(self.scalars, self._inputs)
 
 
 @cache

@@ -11,20 +11,16 @@ from collections import defaultdict
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from functools import cache
-from typing import Any
 
 import numpy as np
 
 from ..arrays import BoolArray, Float64Array, IntArray
 from ..blend import COMPOSITING
-from ..deferred import deferred
 from ..expr import var
 from ..graph import components_of
 from ..layer import Formula, P, Structure
+from ..lower.numpy import Arrays, compile_numpy
 from ..scene import Scene
-
-from_numpy: Callable[..., Any] = deferred("torch", "from_numpy")
-compile_torch: Callable[..., Callable[..., Any]] = deferred("sdf2vec.lower.torch", "compile_torch")
 
 COARSEST = 0.01  # scene units a pixel: lists hold where the picture's shortest side has 100 pixels or more
 MARGIN = 1e-4  # cells: room for a shader's rounding where two cells meet
@@ -143,8 +139,8 @@ def layer_bounds(scene: Scene, slack: float = 0.0) -> Bounds:
     """The bounds of all layers for pixels of at most `COARSEST`."""
     values = np.zeros((len(scene.layers), 7))
     for structure, places, rows in _groups(scene):
-        measured = _measure(structure)(*rows, rows[0].new_tensor(slack))
-        values[places] = np.stack([v.expand(len(places)).numpy() for v in measured], axis=1)
+        measured = _measure(structure)(*rows, slack)
+        values[places] = np.stack([np.broadcast_to(v, len(places)) for v in measured], axis=1)
     return Bounds(values[:, :4], values[:, 4], values[:, 5], values[:, 6])
 
 
@@ -155,31 +151,29 @@ def layer_distances(scene: Scene, layers: IntArray, points: Float64Array) -> Flo
         row_of = np.full(len(scene.layers), -1)
         row_of[places] = np.arange(len(places))
         wanted = np.nonzero(row_of[layers] >= 0)[0]
-        chosen = from_numpy(row_of[layers[wanted]])
-        x, y = from_numpy(points[wanted]).T
-        (found,) = _distance(structure)(x, y, *(row[chosen] for row in rows))
-        distances[wanted] = found.numpy()
+        chosen, (x, y) = row_of[layers[wanted]], points[wanted].T
+        (distances[wanted],) = _distance(structure)(x, y, *(row[chosen] for row in rows))
     return distances
 
 
-def _groups(scene: Scene) -> Iterator[tuple[Structure, IntArray, list[Any]]]:
-    """The layers of each structure: their places [G], and tensors [G] of what `Formula.uniforms` says."""
+def _groups(scene: Scene) -> Iterator[tuple[Structure, IntArray, list[Float64Array]]]:
+    """The layers of each structure: their places [G], and arrays [G] of what `Formula.uniforms` says."""
     members: dict[Structure, list[int]] = defaultdict(list)
     for index, layer in enumerate(scene.layers):
         members[layer.structure].append(index)
     for structure, places in members.items():
         rows = np.array([[COARSEST, *scene.layers[place].numbers] for place in places])
-        yield structure, np.array(places), [from_numpy(np.ascontiguousarray(row)) for row in rows.T]
+        yield structure, np.array(places), list(rows.T)
 
 
 @cache
-def _measure(structure: Structure) -> Callable[..., Any]:
+def _measure(structure: Structure) -> Callable[..., Arrays]:
     """Box, outer and inner distance and slope of a layer from its uniforms and the slack."""
     formula, slack = Formula.of(structure), var("slack")
-    return compile_torch(formula.bounds(slack), [*formula.uniforms, slack])
+    return compile_numpy(formula.bounds(slack), [*formula.uniforms, slack])
 
 
 @cache
-def _distance(structure: Structure) -> Callable[..., Any]:
+def _distance(structure: Structure) -> Callable[..., Arrays]:
     formula = Formula.of(structure)
-    return compile_torch([formula.distance], [*components_of(P), *formula.uniforms])
+    return compile_numpy([formula.distance], [*components_of(P), *formula.uniforms])

@@ -17,7 +17,7 @@ from ..render.tensors import Group, SceneTensors, from_scene, to_scene
 from ..scene import Scene
 from ..steps import Steps
 from ..units import COLOR, FALLOFF, OPACITY, POSITION
-from .settling import Kept, Settling, Views, descend
+from .settling import GOING_ON, Kept, Settling, Views, descend
 
 HARDLY = 0.6  # pixels: an edge of a smaller standard deviation is drawn sharp
 NARROWEST = (1.1, 1.5)  # pixels: of the narrowest blurs, on which renderers agree more or less
@@ -35,10 +35,15 @@ def rounded(scene: Scene, grain: Grain) -> Scene:
     return to_scene(tensors, scene.width, scene.height)
 
 
-def drawable(scene: Scene, views: Views, grain: Grain) -> Scene:
-    """The same, as near to a picture, which is given at any resolution, as it comes by descending meanwhile."""
-    tensors = from_scene(scene)
-    descend(tensors, _settling(tensors, scene, grain), views, scene, frozen=(FALLOFF.name,))
+def drawable(scene: Scene, views: Views, grain: Grain, coarser: Scene | None = None) -> Scene:
+    """The same, as near to a picture, which is given at any resolution, as it comes by descending meanwhile.
+
+    `coarser`: what came of the scene for a coarser drawing. Going on from it ends nearer, and takes half the time.
+    """
+    tensors = from_scene(coarser or scene)
+    settling = _settling(tensors, scene, grain)
+    phases = GOING_ON if coarser else None
+    descend(tensors, settling, views, scene, frozen=(FALLOFF.name,), phases=phases)
     return to_scene(tensors, scene.width, scene.height)
 
 

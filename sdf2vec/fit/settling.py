@@ -32,6 +32,7 @@ PHASES = (
     Phase("settling", 100, 256, rate=0.15, end_rate=0.09, loss=MSE),
     Phase("settling", 100, 320, rate=0.09, end_rate=0.04, loss=MSE),
 )
+GOING_ON = PHASES[1:]  # from what has settled more coarsely
 DUE = {  # from which share of the steps on numbers of a precision settle, and when all have
     "place": (0.0, 0.6),
     "falloff": (0.4, 0.65),
@@ -104,24 +105,30 @@ def descend(
     views: Views,
     scene: Scene,
     frozen: tuple[str, ...] = (),
+    phases: Sequence[Phase] | None = None,
 ) -> None:
     """Goes down the difference from a picture while ever more numbers of a scene settle, until all have; in place.
 
-    `frozen`: names of units of which nothing moves.
+    `frozen`: names of units of which nothing moves. `phases`: PHASES unless told.
     """
     if FEW <= tensors.layer_count <= LARGEST and len(tensors.groups) <= SORTS:
         with threads_of_its_own():
-            _descend(tensors, settling, views, 1.0 / min(scene.width, scene.height), frozen)
+            _descend(tensors, settling, views, 1.0 / min(scene.width, scene.height), frozen, phases or PHASES)
     for group in settling:
         group.settle(1.0)
 
 
 def _descend(
-    tensors: SceneTensors, settling: Sequence[Settling], views: Views, pixel: float, frozen: tuple[str, ...]
+    tensors: SceneTensors,
+    settling: Sequence[Settling],
+    views: Views,
+    pixel: float,
+    frozen: tuple[str, ...],
+    phases: Sequence[Phase],
 ) -> None:
     optimizer = adam_over(tensors, frozen=frozen)
-    done, total = 0, sum(phase.steps for phase in PHASES)
-    for phase in PHASES:
+    done, total = 0, sum(phase.steps for phase in phases)
+    for phase in phases:
         view = views(phase.resolution)
         channels, height, width = view.target.shape
         compose = composer(tensors, width, height, channels)

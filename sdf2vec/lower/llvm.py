@@ -18,9 +18,9 @@ from .llvm_math import DECLARATIONS, FAST, Lines, Number
 Planes = Mapping[str, int]  # pointers by name, and how many rows (a value for each pixel) each points to
 
 SPELLED: dict[str, Callable[..., Number]] = {
-    name: eval(f"lambda a, b=None, c=None: {row.llvm.format('a', 'b', 'c')}", dict(vars(llvm_math)))
+    name: eval(f"lambda a, b=None, c=None: {row.python.format('a', 'b', 'c')}", dict(vars(llvm_math)))
     for name, row in OPERATIONS.items()
-    if row.llvm
+    if row.python
 }
 
 

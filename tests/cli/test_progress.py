@@ -11,7 +11,7 @@ from sdf2vec.fit.loop import Progress
 from sdf2vec.kernel_cache import Assembly
 from sdf2vec.layer import Part
 from sdf2vec.paints import PAINTS
-from sdf2vec.progress import telling
+from sdf2vec.progress import Teller, telling
 from sdf2vec.render import kernels, tiling
 from sdf2vec.running import Running
 from sdf2vec.shapes import KINDS
@@ -51,6 +51,18 @@ def test_the_bar_names_every_phase_and_never_a_number_that_is_none(monkeypatch, 
     assert "nan" not in shown
     assert capsys.readouterr().out == "done: export svg\ndone: check svg\n"
     assert set(teller.seconds) == {"fit", "export svg", "check svg"}
+
+
+def test_the_time_of_a_phase_within_another_counts_once(monkeypatch):
+    clock = iter([0.0, 1.0, 4.0, 5.0, 5.5, 8.0])
+    monkeypatch.setattr("sdf2vec.progress.time.perf_counter", lambda: next(clock))
+    teller = Teller(Running())
+    with teller.phase("export svg"):
+        with teller.phase("fit drawing"):
+            pass
+        with teller.phase("fit drawing"):
+            pass
+    assert teller.seconds == {"fit drawing": 3.5, "export svg": 4.5}
 
 
 def test_a_quiet_run_has_no_bar(monkeypatch, capsys):

@@ -11,6 +11,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
@@ -98,11 +99,11 @@ class Stack:
     """
 
     covers: Float32Array
-    colors: Float64Array
+    colors: Float32Array
     opacities: Float64Array
     ground: Float64Array  # [4] premultiplied
     plain: BoolArray
-    first: tuple[Float64Array, Float64Array]
+    first: tuple[Float32Array, Float64Array]
 
     @property
     def alphas(self) -> Float32Array:
@@ -111,7 +112,7 @@ class Stack:
     @property
     def single_colors(self) -> Float64Array:
         """The colours of the layers that have a single one, [M, 3]."""
-        return np.asarray(self.colors.mean(axis=2)[self.plain])
+        return np.asarray(self.colors.mean(axis=2, dtype=np.float64)[self.plain])
 
     def shown(self) -> tuple[Float32Array, Float32Array]:
         """How much of each layer shows through those above it [N, P], and of the ground [P]."""
@@ -119,11 +120,15 @@ class Stack:
         hidden = showing(alphas)
         return hidden, hidden[0] * (1.0 - alphas[0])
 
+    @cached_property
     def picture(self) -> Float64Array:
         """Premultiplied colour and, without an opaque ground, alpha [3 or 4, P]."""
         hidden, rest = self.shown()
         weights = hidden * self.alphas
-        color = sum(np.multiply(weight, color) for weight, color in zip(weights, self.colors, strict=True))
+        if self.colors.shape[2] == 1:
+            color = self.colors[:, :, 0].T @ weights
+        else:
+            color = np.einsum("np,ncp->cp", weights, self.colors)
         drawn = np.concatenate([color, 1.0 - rest[None]]) + self.ground[:, None] * rest
         return drawn[: self.channels].astype(np.float64)
 
@@ -134,7 +139,7 @@ class Stack:
 
     def error(self, wanted: Float64Array) -> float:
         """Mean squared difference from a picture."""
-        return float(np.mean(np.square(self.picture() - wanted)))
+        return float(np.mean(np.square(self.picture - wanted)))
 
     def with_colors(self, wanted: Float64Array) -> Stack:
         """The single colours that come nearest to a picture [3 or 4, P]."""
@@ -165,8 +170,8 @@ class Stack:
 
     def with_opacities(self, wanted: Float64Array) -> Stack:
         """The opacities that come nearest to a picture [3 or 4, P], where one layer's change leaves the others'."""
-        slopes = np.stack([slope.astype(np.float32).ravel() for slope in self._slopes()])
-        off = (wanted - self.picture()).astype(np.float32).ravel()
+        slopes = np.stack([slope.ravel() for slope in self._slopes()])
+        off = (wanted - self.picture).astype(np.float32).ravel()
         first = self.first[1]
         gram, right = _equations(slopes, off[:, None], self.opacities[:, None], first[:, None])
         low, high = np.maximum(first - FREEDOM, 0.0), np.minimum(first + FREEDOM, 1.0)
@@ -181,7 +186,7 @@ class Stack:
         ]
         return replace(scene, layers=tuple(layers))
 
-    def _slopes(self) -> Iterator[Float64Array]:
+    def _slopes(self) -> Iterator[Float32Array]:
         """For each layer the change of the picture [3 or 4, P] with its opacity."""
         alphas = self.alphas
         steps = steps_over(alphas, self.colors, self.ground)
@@ -191,7 +196,7 @@ class Stack:
     def _color_equations(self, wanted: Float64Array) -> tuple[Float64Array, Float64Array]:
         """Gram matrix and right side of the least squares for the single colours."""
         weights = (self.shown()[0] * self.alphas)[self.plain]
-        off = (wanted - self.picture())[:3].astype(np.float32)
+        off = (wanted - self.picture)[:3].astype(np.float32)
         return _equations(weights, off.T, self.single_colors, self.first[0].mean(axis=2)[self.plain])
 
     def _recolored(self, solved: Float64Array) -> Stack:
@@ -208,7 +213,7 @@ def _stack(
     ground = np.array(scene.ground)
     opacities = np.array([layer.opacity for layer in scene.layers])
     plain = np.array([len(set(layer.colors)) == 1 for layer in scene.layers])
-    exact = Stack(covers.astype(np.float32), colors, opacities, ground, plain, (colors, opacities))
+    exact = Stack(covers, colors, opacities, ground, plain, (colors, opacities))
     x = (np.arange(width) + 0.5 - width / 2) / min(width, height)
     y = (np.arange(height) + 0.5 - height / 2) / min(width, height)
     off = exact.covers.copy()
@@ -218,7 +223,7 @@ def _stack(
     for index in cut:
         levels = 255.0 * max(float(opacities[index]), 1e-6)
         off[index] = np.floor(off[index] * levels + ROUNDING) / levels
-    return replace(exact, covers=off), exact.picture()
+    return replace(exact, covers=off), exact.picture
 
 
 def _add(difference: Difference, x: Float64Array, y: Float64Array, cover: Float32Array) -> None:

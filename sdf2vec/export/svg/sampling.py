@@ -4,21 +4,20 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from functools import cache, lru_cache
+from functools import cache
 from typing import NamedTuple
 
 import numpy as np
-import torch
 
 from ...arrays import Float64Array
-from ...blend import OVER, coverage, reach, saturation
+from ...blend import OVER, coverage, pixel_size, reach, saturation, scene_point
 from ...expr import const, constant, var
-from ...graph import components_of, scalarize, substitute
-from ...layer import PIXEL, Formula, P, Structure, constant_row
-from ...lower.torch import compile_torch
-from ...scene import Layer, Shape
+from ...graph import components_of, scalarize
+from ...layer import Formula, P, Structure
+from ...lower.numpy import Arrays, compile_numpy
+from ...operation import VEC2
+from ...scene import Layer, Scene, Shape
 from ...shapes import KINDS
-from ...threads import threads_of_its_own
 
 CHUNK = 1 << 15  # points computed at a time
 MANY = 16  # shapes of a layer for which compiling takes longest: all is asked for at once
@@ -56,6 +55,17 @@ class SampleGrid(NamedTuple):
     y: Float64Array
     step: float
 
+    def places_in(self, box: Box) -> tuple[slice, slice]:
+        """Which rows and columns have their centres in a box."""
+        bottom, right = np.searchsorted(self.y, box.bottom), np.searchsorted(self.x, box.right)
+        return slice(np.searchsorted(self.y, box.top), bottom), slice(
+            np.searchsorted(self.x, box.left), right
+        )
+
+    def part(self, rows: slice, columns: slice) -> SampleGrid:
+        """The cells of some rows and columns."""
+        return SampleGrid(self.x[columns], self.y[rows], self.step)
+
 
 def grid_over(box: Box, step: float) -> SampleGrid:
     """A grid that covers a box."""
@@ -66,6 +76,21 @@ def grid_over(box: Box, step: float) -> SampleGrid:
         np.asarray(box.top + (np.arange(rows) + 0.5) * step, np.float64),
         step,
     )
+
+
+def canvas_grid(scene: Scene, width: int, height: int) -> SampleGrid:
+    """The pixels of a scene's render."""
+    columns, rows = np.arange(width) + 0.5, np.arange(height) + 0.5
+    x, _, step = _canvas()(columns, 0.0, width, height, *scene.extent)
+    _, y, _ = _canvas()(0.0, rows, width, height, *scene.extent)
+    return SampleGrid(x, y, float(step))
+
+
+@cache
+def _canvas() -> Callable[..., Arrays]:
+    pixel, resolution, size = var("pixel", VEC2), var("resolution", VEC2), var("size", VEC2)
+    inputs = [scalar for vector in (pixel, resolution, size) for scalar in components_of(vector)]
+    return compile_numpy([scene_point(pixel, resolution, size), pixel_size(resolution, size)], inputs)
 
 
 # --- the edge ----------------------------------------------------------------------------------------------
@@ -80,28 +105,27 @@ def edge_range() -> tuple[float, float]:
 
 def edge_profile(distance: Float64Array) -> Float64Array:
     """Coverage by distance in falloffs: the curve that gradients follow."""
-    (cover,) = _profile()(torch.as_tensor(distance))
-    return np.asarray(cover.numpy())
+    return _profile()(distance)[0]
 
 
 @cache
-def _profile() -> Callable[..., tuple[torch.Tensor, ...]]:
+def _profile() -> Callable[..., Arrays]:
     distance = var("d")
-    return compile_torch([coverage(distance, const(1.0), const(0.0))], [distance])
+    return compile_numpy([coverage(distance, const(1.0), const(0.0))], [distance])
 
 
 # --- a layer -----------------------------------------------------------------------------------------------
 
 
-@lru_cache(maxsize=4096)  # asked again for each blur that is tried
-def extent(layer: Layer, falloffs: float | None = None) -> Box:
-    """A box that holds every point nearer to a layer than so many falloffs: all of its coverage by default."""
-    formula = Formula(layer.structure, constant_row(layer.structure, layer.numbers))
-    margin = formula.reach[0] if falloffs is None else const(layer.falloff * falloffs)
-    left, top, right, bottom = (
-        constant(substitute(side, {PIXEL: const(0.0)})) for side in formula.extent(margin)
-    )
-    return Box(left, top, right, bottom)
+def extent(layer: Layer, pixel: float = 0.0) -> Box:
+    """A box that holds every point where a layer has coverage, for pixels of a size in scene units."""
+    return Box(*map(float, _extent(layer.structure)(pixel, *layer.numbers)))
+
+
+@cache
+def _extent(structure: Structure) -> Callable[..., Arrays]:
+    formula = Formula.of(structure)
+    return compile_numpy(formula.extent(formula.reach[0]), formula.uniforms)
 
 
 class ShapeFrame(NamedTuple):
@@ -134,9 +158,7 @@ def covers(layer: Layer, grid: SampleGrid, pixel: float) -> Float64Array:
 
 def cover_at(layer: Layer, places: Float64Array, pixel: float) -> Float64Array:
     """Coverage [N] of a layer at points [N, 2], for pixels of a size in scene units."""
-    flat = [torch.tensor(value, dtype=torch.float64) for value in (pixel, *layer.numbers)]
-    x, y = torch.from_numpy(np.ascontiguousarray(places)).T
-    return np.asarray(_formula(layer.structure, 2)(x, y, *flat)[1].numpy())
+    return _formula(layer.structure, 2)(*places.T, pixel, *layer.numbers)[1]
 
 
 def colors(layer: Layer, grid: SampleGrid) -> Float64Array:
@@ -146,20 +168,18 @@ def colors(layer: Layer, grid: SampleGrid) -> Float64Array:
 
 def _evaluate(layer: Layer, grid: SampleGrid, pixel: float, count: int) -> Float64Array:
     """The first `count` of distance, coverage, red, green, blue, at least: [count or more, Y, X]."""
-    flat = [torch.tensor(value, dtype=torch.float64) for value in (pixel, *layer.numbers)]
     formula = _formula(layer.structure, 5 if len(layer.shapes) > MANY else count)
-    columns = torch.from_numpy(grid.x)[None, :]
-    chunks = torch.from_numpy(grid.y)[:, None].split(max(1, CHUNK // len(grid.x)))
-    with threads_of_its_own():  # on such small pieces a second one mostly waits, for long when it has no core
-        parts = [
-            np.stack([part.expand(len(rows), len(grid.x)).numpy() for part in formula(columns, rows, *flat)])
-            for rows in chunks
-        ]
+    rows = max(1, CHUNK // len(grid.x))
+    parts = []
+    for first in range(0, len(grid.y), rows):
+        y = grid.y[first : first + rows, None]
+        found = formula(grid.x, y, pixel, *layer.numbers)
+        parts.append(np.stack([np.broadcast_to(part, (len(y), len(grid.x))) for part in found]))
     return np.concatenate(parts, axis=1)
 
 
 @cache
-def _formula(structure: Structure, count: int) -> Callable[..., tuple[torch.Tensor, ...]]:
+def _formula(structure: Structure, count: int) -> Callable[..., Arrays]:
     formula = Formula.of(structure)
     wanted = [formula.distance, formula.cover(OVER), *scalarize(formula.color)][:count]
-    return compile_torch(wanted, [*components_of(P), *formula.uniforms])
+    return compile_numpy(wanted, [*components_of(P), *formula.uniforms])

@@ -3,32 +3,25 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from typing import NamedTuple, TypeVar
+from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
-from ...arrays import Float64Array
-from ...deferred import deferred
+from ...arrays import Float32Array, Float64Array
+from ...layer import is_flat
 from ...scene import Scene
-
-pixel_points = deferred("sdf2vec.render.reference", "canvas")
-covers_at = deferred("sdf2vec.render.reference", "layers_at")
-from_scene = deferred("sdf2vec.render.tensors", "from_scene")
-
-Float = TypeVar("Float", np.float32, np.float64)
+from .sampling import canvas_grid, colors, covers, extent
 
 SIDE = 128  # pixels along the shortest side of the small canvas
 MOST = 1 << 23  # layers × pixels
 LONG = 1 << 18  # pixels, of a canvas that is very long
-AT_ONCE = 1 << 20  # of them, for a formula holds dozens of numbers for each
 
 
 class LayerSamples(NamedTuple):
     """Coverage [N, P] and colour [N, 3, P or 1] of all layers on a small canvas, P = width × height."""
 
-    covers: Float64Array
-    colors: Float64Array
+    covers: Float32Array
+    colors: Float32Array
     width: int
     height: int
 
@@ -38,20 +31,20 @@ def contrasts(scene: Scene, samples: LayerSamples) -> Float64Array:
 
     It counts what lies below the layer and how much of it later layers hide; the mean is over the layer's soft edge.
     """
-    covers, colors, *_ = samples
-    soft = covers * (1.0 - covers) + 1e-3 * covers + 1e-9
-    opacity = np.array([layer.opacity for layer in scene.layers])[:, None]
-    alphas = covers * opacity
+    covered, painted, *_ = samples
+    soft = covered * (1.0 - covered) + 1e-3 * covered + 1e-9
+    opacity = np.array([layer.opacity for layer in scene.layers], np.float32)[:, None]
+    alphas = covered * opacity
     through = showing(alphas) * opacity
-    found = np.empty(len(covers))
-    for i, step in enumerate(steps_over(alphas, colors, np.array(scene.ground))):
+    found = np.empty(len(covered))
+    for i, step in enumerate(steps_over(alphas, painted, np.array(scene.ground))):
         change = np.square(step)
         shown = change[:3].mean(axis=0) + (0.0 if scene.opaque else change[3])
         found[i] = np.sum(soft[i] * shown * np.square(through[i])) / soft[i].sum()
     return found
 
 
-def showing(alphas: NDArray[Float]) -> NDArray[Float]:
+def showing(alphas: Float32Array) -> Float32Array:
     """[N, P]: how much of each layer shows through those above it, from the alphas [N, P] of all, lowest first."""
     through = np.ones_like(alphas)
     for i in range(
@@ -61,12 +54,12 @@ def showing(alphas: NDArray[Float]) -> NDArray[Float]:
     return through
 
 
-def steps_over(alphas: NDArray[Float], colors: Float64Array, ground: Float64Array) -> Iterator[Float64Array]:
+def steps_over(alphas: Float32Array, colors: Float32Array, ground: Float64Array) -> Iterator[Float32Array]:
     """For each layer, lowest first, its opaque colour minus what lies below it, premultiplied RGBA [4, P].
 
     `alphas` [N, P], `colors` [N, 3, P or 1], `ground` [4] premultiplied.
     """
-    below = np.repeat(ground[:, None], alphas.shape[1], axis=1)
+    below = np.repeat(ground[:, None].astype(np.float32), alphas.shape[1], axis=1)
     for alpha, color in zip(alphas, colors, strict=True):
         step = np.empty_like(below)
         np.subtract(color, below[:3], out=step[:3])
@@ -78,18 +71,23 @@ def steps_over(alphas: NDArray[Float], colors: Float64Array, ground: Float64Arra
 def layers_at(scene: Scene) -> LayerSamples:
     """All layers on a small canvas of the scene's shape."""
     if not scene.layers:
-        return LayerSamples(np.zeros((0, 1)), np.zeros((0, 3, 1)), 1, 1)
+        return LayerSamples(np.zeros((0, 1), np.float32), np.zeros((0, 3, 1), np.float32), 1, 1)
     width, height = _small_canvas(scene)
-    tensors = from_scene(scene)
-    x, y, pixel = pixel_points(tensors, width, height)
-    scale = min(width, height) / min(scene.width, scene.height)
-    chunk = max(1, AT_ONCE // len(scene.layers))
-    chunks = zip(x.split(chunk), y.split(chunk), strict=True)
-    parts = [covers_at(tensors, own_x, own_y, pixel * scale) for own_x, own_y in chunks]
-    covers = np.concatenate([cover.numpy() for cover, _ in parts], axis=1, dtype=np.float64)
-    colors = [color.double().numpy() for _, color in parts]
-    flat = colors[0].shape[2] == 1
-    return LayerSamples(covers, colors[0] if flat else np.concatenate(colors, axis=2), width, height)
+    grid, pixel = canvas_grid(scene, width, height), 1.0 / min(scene.width, scene.height)
+    covered = np.zeros((len(scene.layers), height, width), np.float32)
+    means = np.array([np.mean(layer.colors, axis=0) for layer in scene.layers], np.float32)
+    flat = all(is_flat(layer.structure) for layer in scene.layers)
+    painted = np.tile(means[..., None, None], (1, 1) if flat else (height, width))
+    for index, layer in enumerate(scene.layers):
+        places = grid.places_in(extent(layer, pixel))
+        part = grid.part(*places)
+        if part.x.size and part.y.size:
+            covered[index][places] = covers(layer, part, pixel)
+            if not flat:
+                painted[index][:, *places] = colors(layer, part)
+    return LayerSamples(
+        covered.reshape(len(covered), -1), painted.reshape(len(painted), 3, -1), width, height
+    )
 
 
 def _small_canvas(scene: Scene) -> tuple[int, int]:

@@ -48,7 +48,6 @@ def test_a_disc():
     assert cover_at(DISC, np.array([[0.5, 0.0], [0.8, 0.0], [2.0, 0.0]]), 1e-6) == pytest.approx([1, 0.5, 0])
     far = 0.25 + 0.1 * edge_range()[1]
     assert extent(DISC) == pytest.approx((0.5 - far, -far, 0.5 + far, far))
-    assert extent(DISC, 0.5) == pytest.approx((0.2, -0.3, 0.8, 0.3))
 
 
 def test_the_frame_of_a_box_is_turned_with_it():
