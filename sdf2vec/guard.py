@@ -101,10 +101,16 @@ def problem_of(error: Exception) -> Problem:
 
 
 @cache
-def begin_worker(show: bool) -> None:
-    """Once in a process that converts for another one: it leaves Ctrl-C to that, speaks for it, ends with it."""
+def end_with_parent() -> None:
+    """Once in a process that works for another one: it ends when that does."""
     if parent := multiprocessing.parent_process():
         threading.Thread(target=_end_with, args=(parent,), daemon=True).start()
+
+
+@cache
+def begin_worker(show: bool) -> None:
+    """Once in a process that converts for another one: it leaves Ctrl-C to that, speaks for it, ends with it."""
+    end_with_parent()
     Output.show, warnings.showwarning = show, _warn
     with suppress(ValueError):  # in a thread: whoever started the process looks after signals
         signal.signal(signal.SIGINT, signal.SIG_IGN)

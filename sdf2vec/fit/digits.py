@@ -30,18 +30,17 @@ def fit_concisely(picture: Picture, settings: Settings, callback: Callback) -> S
 def concise(scene: Scene, picture: Picture, settings: Settings) -> Scene:
     """The scene with all numbers of a unit rounded to as few decimals as its nearness to the picture allows.
 
-    How far its render moves by that is measured, unit by unit. Colours that were chosen stay what they are.
+    How far its render moves by that is measured, unit by unit, and how much farther from the picture that is. Colours
+    that were chosen stay what they are.
     """
     view = view_of(picture.premultiplied, settings, RESOLUTION)
     tensors = from_scene(scene)
-    before = _drawn(tensors, view.target.shape)
-    wrong = float((before - view.target).square().mean())
+    wrong = _apart(_drawn(tensors, view.target.shape), view.target)
     still = (COLOR, BACKGROUND) if settings.palette or settings.colors else ()
     units = _units_of(tensors, still)
     allowed = max(LOSS * wrong, UNSEEN) / max(len(units), 1)
     for unit in units:
-        tensors = _coarsest(tensors, unit, before, allowed, 1.0 / min(picture.width, picture.height))
-        before = _drawn(tensors, view.target.shape)
+        tensors = _coarsest(tensors, unit, view.target, allowed, 1.0 / min(picture.width, picture.height))
     return to_scene(tensors, scene.width, scene.height)
 
 
@@ -52,12 +51,17 @@ def _units_of(scene: SceneTensors, without: Collection[Unit]) -> list[Unit]:
 
 
 def _coarsest(
-    scene: SceneTensors, unit: Unit, before: torch.Tensor, allowed: float, pixel: float
+    scene: SceneTensors, unit: Unit, target: torch.Tensor, allowed: float, pixel: float
 ) -> SceneTensors:
-    """The scene with the numbers of a unit rounded as far as that moves its render by no more than is allowed."""
+    """The scene with the numbers of a unit rounded as far as that moves its render, and away from a target, by no more
+    than is allowed.
+    """
+    before = _drawn(scene, target.shape)
+    farthest = _apart(before, target) + allowed
     for decimals in range(unit.decimals - 1, 0, -1):
         tried = _rounded(scene, unit, decimals, pixel)
-        if float((_drawn(tried, before.shape) - before).square().mean()) > allowed:
+        drawn = _drawn(tried, target.shape)
+        if _apart(drawn, before) > allowed or _apart(drawn, target) > farthest:
             break
         scene = tried
     return scene
@@ -100,6 +104,11 @@ def _rounded_group(group: Group, unit: Unit, decimals: int) -> Group:
         for slot, tensor in group.values.items()
     }
     return Group(group.structure, group.order, values)
+
+
+def _apart(a: torch.Tensor, b: torch.Tensor) -> float:
+    """Mean squared difference."""
+    return float((a - b).square().mean())
 
 
 @torch.no_grad()

@@ -9,6 +9,7 @@ from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wai
 from concurrent.futures.process import BrokenProcessPool
 from typing import Any
 
+from .. import guard
 from ..running import Running
 
 Slot = int  # which of the processes
@@ -65,5 +66,6 @@ class Processes:
 
 
 def _begin(threads: int) -> None:
-    """First of all in a process."""
+    """First of all in a process, which may be left alone before it gets a task."""
+    guard.end_with_parent()
     os.environ.setdefault("SDF2VEC_THREADS", str(threads))

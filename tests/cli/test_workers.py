@@ -2,7 +2,9 @@
 
 import json
 import os
+import subprocess
 import sys
+import time
 import types
 from pathlib import Path
 from typing import Any
@@ -55,6 +57,35 @@ def test_killed_workers_lose_nothing(album, run, monkeypatch):
         0,
         {name: len((album / "tries" / name).read_text()) for name in PICTURES},
     )
+
+
+def test_a_worker_that_never_got_a_picture_ends_with_its_run(tmp_path):
+    """Killed as a system does that has no memory left: nobody tells the worker."""
+    code = """
+import os, signal
+from sdf2vec.running import Running
+from sdf2vec.workers.processes import Processes
+
+if __name__ == "__main__":
+    with open("worker", "w") as file:
+        file.write(str(Processes(Running(), 1, 1).start(os.getpid).result()))
+    os.kill(os.getpid(), signal.SIGKILL)
+"""
+    (tmp_path / "run.py").write_text(code)
+    subprocess.run([sys.executable, "run.py"], cwd=tmp_path, stderr=subprocess.DEVNULL, check=False)
+    worker = int((tmp_path / "worker").read_text())
+    end = time.monotonic() + 20.0
+    while is_there(worker):
+        assert time.monotonic() < end
+        time.sleep(0.01)
+
+
+def is_there(process):
+    try:
+        os.kill(process, 0)
+    except ProcessLookupError:
+        return False
+    return True
 
 
 class Reference:

@@ -33,6 +33,12 @@ def test_attacks(name):
             break
 
 
+@pytest.mark.filterwarnings("ignore::sdf2vec.errors.Sdf2vecWarning")
+def test_a_fit_that_has_failed_before():
+    """A palette on a picture of five pixels: rounding its numbers made it worse than the ground."""
+    assert attempt("fits", 1300357) == ""
+
+
 @pytest.mark.filterwarnings("ignore::RuntimeWarning")
 @pytest.mark.parametrize(("seed", "target"), FAILED)
 def test_what_has_failed_before(seed, target):
