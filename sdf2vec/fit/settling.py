@@ -131,7 +131,7 @@ def _descend(
     for phase in phases:
         view = views(phase.resolution)
         channels, height, width = view.target.shape
-        compose = composer(tensors, width, height, channels)
+        compose = composer(tensors, width, height, channels, total)
         measure = objective(phase.loss, view.target, view.weights)
         for rate in phase.rates():
             for group in settling:

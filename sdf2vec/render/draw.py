@@ -16,8 +16,9 @@ from . import fused, reference
 from .tensors import SceneTensors, from_scene
 
 LARGE = 1 << 25  # layers × pixels from which compiling kernels pays
-OFTEN = 1 << 20  # the same for what is drawn often
+LONG = 1 << 26  # shapes × pixels × times from which it pays for what is drawn so often, and its derivatives
 GLANCE = 256  # shortest side, in pixels, at most
+GLANCES = 64  # of a scene, about, while its numbers are rounded
 
 
 def draw(scene: Scene, width: int | None = None, height: int | None = None) -> torch.Tensor:
@@ -45,9 +46,10 @@ def is_large(scene: Scene, width: int, height: int) -> bool:
 Compose = Callable[[SceneTensors, int, int], torch.Tensor]
 
 
-def composer(tensors: SceneTensors, width: int, height: int, channels: int) -> Compose:
-    """What draws a scene often, and as often its derivatives: premultiplied, before clamping, [channels, H, W]."""
-    if tensors.layer_count * width * height < OFTEN:
+def composer(tensors: SceneTensors, width: int, height: int, channels: int, times: int) -> Compose:
+    """What draws a scene so often, and its derivatives: premultiplied, before clamping, [channels, H, W]."""
+    shapes = sum(len(group) * len(group.structure) for group in tensors.groups)
+    if shapes * width * height * times < LONG:
         return lambda tensors, width, height: reference.composite(tensors, width, height)[:channels]
     return partial(fused.composite, channels=channels)
 
@@ -60,7 +62,7 @@ def glance(scene: Scene) -> Float32Array:
     )
     channels = 3 if scene.opaque else 4
     with torch.no_grad(), threads_of_its_own():
-        pixels: Float32Array = composer(tensors, *size, channels)(tensors, *size).numpy()
+        pixels: Float32Array = composer(tensors, *size, channels, GLANCES)(tensors, *size).numpy()
     return pixels
 
 

@@ -13,6 +13,7 @@ from .display import Contour, Path, Segment
 
 # User units: no corner is the middle of a pixel, where renderers differ about whose that pixel is.
 ASIDE = 0.0137
+SPECK = 8  # points of a contour that is too small for curves: there may be thousands
 ROUNDS = 3  # of fitting a curve and moving its parameters to the nearest places
 
 approximate_polygon: Callable[[Points, float], Points] = deferred("skimage.measure", "approximate_polygon")
@@ -32,6 +33,8 @@ def straight_path(contours: Sequence[Points], tolerance: float, canvas: Canvas) 
 
 def _smooth(contour: Points, tolerance: float, canvas: Canvas) -> Contour:
     points = contour[:-1] if np.array_equal(contour[0], contour[-1]) else contour
+    if SPECK >= len(points) > 2:
+        return Contour.straight(pairs(canvas.rounded(points)))
     points = np.concatenate([points, points[:1]])
     rough = approximate_polygon(points, 12 * tolerance)
     if len(rough) < 4:

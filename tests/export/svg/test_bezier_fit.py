@@ -34,5 +34,11 @@ def test_a_square_is_four_lines_aside_of_the_pixels():
     assert np.allclose(corners, np.array([[10, 10], [50, 10], [50, 50], [10, 50]]) + ASIDE)
 
 
+def test_a_speck_has_its_own_points():
+    points = np.array([[1.0, 1.0], [3.0, 0.5], [4.0, 2.0], [2.5, 3.5]])
+    (contour,) = smooth_path([np.concatenate([points, points[:1]])], 0.05, CANVAS).contours
+    assert np.allclose([contour.start, *(end for *_, end in contour.segments)], points)
+
+
 def test_what_has_no_area_is_left_out():
     assert smooth_path([np.array([[1.0, 1.0], [1.0, 1.0]])], 0.05, CANVAS).contours == ()
