@@ -31,8 +31,8 @@ from .shader import most_shapes
 from .svg import svg
 
 FALLBACK = 1 << 20  # pixels
-NEAR, MANY = 64.0, 256  # dB that the page's scene is from the one it was made of, where it has so many shapes
-NEAREST = 105.0  # fewer can have more
+NEAR, MANY = 52.0, 256  # dB that the page's scene is from the one it was made of, where it has so many shapes
+SLOPE, NEAREST = 36.0, 105.0  # fewer can have more: by ten times fewer, and at most
 POLICY = "what the page may do"  # where the template has it
 SCRIPT = re.compile(r'<script type="module">(.*?)</script>', re.DOTALL)
 STYLE = re.compile(r"<style>(.*?)</style>", re.DOTALL)
@@ -69,8 +69,8 @@ def html(scene: Scene, options: Options) -> Exported:
 
 
 def _aim(shapes: int) -> float:
-    """How near the page's scene is to be: half as many shapes can have numbers that are nearly three times as fine."""
-    return min(NEAR + 30.0 * math.log10(max(1.0, MANY / max(shapes, 1))), NEAREST)
+    """How near the page's scene is to be: half as many shapes can have numbers that are three times as fine."""
+    return min(NEAR + SLOPE * math.log10(max(1.0, MANY / max(shapes, 1))), NEAREST)
 
 
 def _form(scene: Scene) -> Form:

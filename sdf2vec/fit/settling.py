@@ -40,7 +40,7 @@ DUE = {  # from which share of the steps on numbers of a precision settle, and w
     "color": (0.5, 0.97),
 }
 FEW, LARGEST = 5, 2048  # layers: fewer are found exactly, more would take too long
-SORTS = 6  # of layers: kernels for more take too long to compile
+PARTS = 16  # of the formulas of all sorts of layers: kernels for more take too long to compile
 
 
 def views_of(picture: Picture) -> Views:
@@ -111,7 +111,8 @@ def descend(
 
     `frozen`: names of units of which nothing moves. `phases`: PHASES unless told.
     """
-    if FEW <= tensors.layer_count <= LARGEST and len(tensors.groups) <= SORTS:
+    parts = sum(len(group.structure) for group in tensors.groups)
+    if FEW <= tensors.layer_count <= LARGEST and parts <= PARTS:
         with threads_of_its_own():
             _descend(tensors, settling, views, 1.0 / min(scene.width, scene.height), frozen, phases or PHASES)
     for group in settling:

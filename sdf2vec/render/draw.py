@@ -15,10 +15,12 @@ from ..threads import threads_of_its_own
 from . import fused, reference
 from .tensors import SceneTensors, from_scene
 
-LARGE = 1 << 25  # layers × pixels from which compiling kernels pays
-LONG = 1 << 26  # shapes × pixels × times from which it pays for what is drawn so often, and its derivatives
+LARGE = 1 << 25  # layers × pixels from which compiling kernels pays for what is drawn once
+PART = (
+    1 << 22
+)  # shapes × pixels, with derivatives, while kernels compile: for a sort of layers, and each shape in it
 GLANCE = 256  # shortest side, in pixels, at most
-GLANCES = 64  # of a scene, about, while its numbers are rounded
+GLANCES = 16  # of a scene, about, while its numbers are rounded
 
 
 def draw(scene: Scene, width: int | None = None, height: int | None = None) -> torch.Tensor:
@@ -49,7 +51,8 @@ Compose = Callable[[SceneTensors, int, int], torch.Tensor]
 def composer(tensors: SceneTensors, width: int, height: int, channels: int, times: int) -> Compose:
     """What draws a scene so often, and its derivatives: premultiplied, before clamping, [channels, H, W]."""
     shapes = sum(len(group) * len(group.structure) for group in tensors.groups)
-    if shapes * width * height * times < LONG:
+    compiling = PART * sum(1 + len(group.structure) for group in tensors.groups)
+    if shapes * width * height * times < compiling:
         return lambda tensors, width, height: reference.composite(tensors, width, height)[:channels]
     return partial(fused.composite, channels=channels)
 

@@ -7,6 +7,7 @@ import time
 
 from tests.fuzz.attacks import ATTACKS, attempt
 
+EXPORTED = ("scenes", "unions")
 LONGEST = 20.0  # CPU seconds that a scene's export may take
 
 
@@ -29,7 +30,7 @@ def main():
         problem = attempt(name, seed)
         spent = time.process_time() - started
         slowest[name] = max(slowest[name], spent)
-        if name == "scenes" and spent > LONGEST:
+        if name in EXPORTED and spent > LONGEST:
             problem = problem or f"took {spent:.0f} CPU s"
         tried[name] += 1
         if problem:

@@ -16,6 +16,7 @@ from sdf2vec.export import EXPORTERS
 from sdf2vec.export.options import GLSL_VERSIONS, LAYOUTS, SVG_PROFILES, Options
 from sdf2vec.fit.settings import Settings, settings_of
 from sdf2vec.image import load
+from sdf2vec.scene import MAX_JOINED
 from tests.fuzz import domain
 from tests.fuzz.fits import attack_fits
 from tests.fuzz.kills import attack_kills
@@ -132,6 +133,27 @@ def attack_scenes(seed):
         assert "nan" not in data.lower().split()
 
 
+LIMITS: tuple[tuple[str, dict[str, Any]], ...] = (
+    ("svg", {}),
+    ("svg", {"svg_profile": "portable"}),
+    ("svg", {"max_bytes": 20_000}),
+    ("pdf", {}),
+    ("html", {}),
+    ("glsl", {}),
+    ("wgsl", {}),
+    ("shadertoy", {}),
+    ("shadertoy", {"layout": "packed"}),
+    ("shadertoy", {"max_bytes": 20_000}),
+    ("sdf", {}),
+)
+
+
+def attack_unions(seed):
+    """A scene of the longest unions there may be, through an export or a form of one."""
+    target, options = LIMITS[seed % len(LIMITS)]
+    assert sdf2vec.export(domain.scene(seed, 2, MAX_JOINED, "over"), target, **options)
+
+
 def attack_options(seed):
     """Options of fits and exports with a value that may be anything."""
     r = random.Random(seed)
@@ -146,6 +168,7 @@ ATTACKS = {
     "pictures": attack_pictures,
     "arrays": attack_arrays,
     "scenes": attack_scenes,
+    "unions": attack_unions,
     "options": attack_options,
     "fits": attack_fits,
     "kills": attack_kills,

@@ -12,6 +12,7 @@ SHARES = {
     "pictures": (2000, 4.0),
     "arrays": (500, 2.0),
     "scenes": (60, 5.0),
+    "unions": (11, 3.0),
     "options": (1000, 2.0),
     "fits": (20, 2.0),
     "kills": (6, 3.0),
