@@ -86,9 +86,7 @@ def convert(job: Job, work: Work, teller: Teller, stop: Stop) -> Done:
     early = ", stopped early" if stop.requested else ""
     size = f"{picture.width} x {picture.height}"
     near = _described(quality, picture)
-    teller.say(
-        f"{_name(job.source)}: {size}, {scene.shape_count} shapes, {near}, fitted in {seconds:.1f} s{early}"
-    )
+    teller.say(f"{_name(job.source)}: {size}, {scene.count_text}, {near}, fitted in {seconds:.1f} s{early}")
     if fitted.reason:
         teller.say(f"  {fitted.reason}")
     if is_lettering(picture.pixels):

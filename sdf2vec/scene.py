@@ -360,9 +360,7 @@ class Scene:
 
     def __repr__(self) -> str:
         kinds = dict.fromkeys(shape.kind for layer in self.layers for shape in layer.shapes)
-        told = f"{self.shape_count} shapes in {len(self.layers)} layers" + (
-            f": {', '.join(kinds)}" if kinds else ""
-        )
+        told = f"{self.count_text} in {len(self.layers)} layers" + (f": {', '.join(kinds)}" if kinds else "")
         ground = "" if self.opaque else ", transparent"
         return f"<Scene {self.width} × {self.height}, {told}; {self.compositing}{ground}>"
 
@@ -376,6 +374,11 @@ class Scene:
     @property
     def shape_count(self) -> int:
         return sum(len(layer.shapes) for layer in self.layers)
+
+    @property
+    def count_text(self) -> str:
+        """How many shapes it has, for people."""
+        return "1 shape" if self.shape_count == 1 else f"{self.shape_count} shapes"
 
     @property
     def ground(self) -> tuple[float, float, float, float]:

@@ -195,7 +195,7 @@ def test_shader_text_is_readable():
         "// 0 circle"
     )
     assert line in text.splitlines()
-    assert "// photo.png in 1 shapes, fitted at 30 x 20." in text
+    assert "// photo.png in 1 shape, fitted at 30 x 20." in text
     assert "precision highp float;" in text
 
 

@@ -331,7 +331,6 @@ def _counted(scene: Scene) -> str:
     """How many shapes of which kinds."""
     kinds = Counter(shape.kind for layer in scene.layers for shape in layer.shapes)
     listed = ", ".join(f"{count} {kind}" for kind, count in kinds.most_common())
-    shapes = "1 shape" if scene.shape_count == 1 else f"{scene.shape_count} shapes"
     layers = "1 layer" if len(scene.layers) == 1 else f"{len(scene.layers)} layers"
     joined = f" in {layers}" if len(scene.layers) < scene.shape_count else ""
-    return shapes + joined + (f" ({listed})" if listed else "")
+    return scene.count_text + joined + (f" ({listed})" if listed else "")
