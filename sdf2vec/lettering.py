@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from typing import Any
+
 import numpy as np
-from scipy import ndimage
-from skimage.filters import threshold_otsu
-from skimage.measure import label, regionprops
 
 from .arrays import BoolArray, Float32Array
+from .deferred import deferred
 
 LARGEST = 512  # pixels across that are looked at, by leaving out others
 LETTERS = 5  # at least
@@ -18,6 +19,12 @@ NEAR = 0.2  # of the contrast
 THIN = 0.22  # strokes of a letter are no wider, half across, than this part of its height
 ALIKE = 0.6  # of the letters have a height between half and twice the usual
 SMALLEST = 4  # pixels: a letter's height
+LEVELS, PEAK = 32, 5  # of a picture's range; so many of them are one tone
+
+distance_transform: Callable[..., Any] = deferred("scipy.ndimage", "distance_transform_edt")
+label: Callable[..., Any] = deferred("skimage.measure", "label")
+regionprops: Callable[..., Any] = deferred("skimage.measure", "regionprops")
+threshold_otsu: Callable[..., Any] = deferred("skimage.filters", "threshold_otsu")
 
 
 def is_lettering(pixels: Float32Array) -> bool:
@@ -25,7 +32,7 @@ def is_lettering(pixels: Float32Array) -> bool:
     ink = _ink(pixels)
     if ink is None:
         return False
-    depth = ndimage.distance_transform_edt(ink)
+    depth = distance_transform(ink)
     marks = [mark for mark in regionprops(label(ink, connectivity=2)) if _height(mark.bbox) >= SMALLEST]
     if len(marks) < LETTERS:
         return False
@@ -48,6 +55,17 @@ def _on_other_tone(tones: Float32Array, alpha: Float32Array) -> Float32Array:
     return tones * alpha + other * (1 - alpha)
 
 
+def _in_two_peaks(tones: Float32Array) -> float:
+    """The share of the pixels that have one of the two tones which most have: of a photograph it is small."""
+    counts, total = np.histogram(tones, LEVELS)[0], 0.0
+    for _ in range(2):
+        peaks = np.convolve(counts, np.ones(PEAK), "same")
+        best = int(peaks.argmax())
+        total += peaks[best]
+        counts[max(0, best - PEAK // 2) : best + PEAK // 2 + 1] = 0
+    return total / tones.size
+
+
 def _ink(pixels: Float32Array) -> BoolArray | None:
     """Where the rarer of two tones is, [H, W]; None where there are more tones, or none."""
     step = -(-max(pixels.shape[:2]) // LARGEST)
@@ -55,7 +73,7 @@ def _ink(pixels: Float32Array) -> BoolArray | None:
     tones = seen[..., :3].mean(axis=2)
     if seen.shape[2] == 4:
         tones = _on_other_tone(tones, seen[..., 3])
-    if float(np.ptp(tones)) < CONTRAST:
+    if float(np.ptp(tones)) < CONTRAST or _in_two_peaks(tones) < TWO_TONES:
         return None
     dark = tones < threshold_otsu(tones)
     ink = dark if dark.mean() < 0.5 else ~dark
