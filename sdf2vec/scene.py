@@ -376,6 +376,11 @@ class Scene:
         return sum(len(layer.shapes) for layer in self.layers)
 
     @property
+    def pixel(self) -> float:
+        """The side of a pixel of the fitted picture, in scene units."""
+        return 1.0 / min(self.width, self.height)
+
+    @property
     def count_text(self) -> str:
         """How many shapes it has, for people."""
         return "1 shape" if self.shape_count == 1 else f"{self.shape_count} shapes"

@@ -50,7 +50,7 @@ def drawable(scene: Scene, views: Views, grain: Grain, coarser: Scene | None = N
 def _settling(tensors: SceneTensors, scene: Scene, grain: Grain) -> list[Settling]:
     """The groups of a scene, whose layers have the falloffs of their classes from now on."""
     if tensors.groups:
-        _soften(tensors, 1.0 / min(scene.width, scene.height), grain.softnesses)
+        _soften(tensors, scene.pixel, grain.softnesses)
     return [
         Settling(group, _steps(group, grain, tensors.size), partial(_unfold, group, grain))
         for group in tensors.groups

@@ -114,7 +114,7 @@ def descend(
     parts = sum(len(group.structure) for group in tensors.groups)
     if FEW <= tensors.layer_count <= LARGEST and parts <= PARTS:
         with threads_of_its_own():
-            _descend(tensors, settling, views, 1.0 / min(scene.width, scene.height), frozen, phases or PHASES)
+            _descend(tensors, settling, views, scene.pixel, frozen, phases or PHASES)
     for group in settling:
         group.settle(1.0)
 

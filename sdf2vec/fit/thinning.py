@@ -40,7 +40,7 @@ def thinned(
             raise Stopped
 
     layers = Layers(settings.kinds, scene.compositing)
-    generator, pixel = torch.Generator(), 1.0 / min(scene.width, scene.height)
+    generator, pixel = torch.Generator(), scene.pixel
     search = Search(layers, preset_of(settings).falloff, generator, tick, pixel)
     view = view_of(picture.premultiplied, settings, RESOLUTION)
     tensors = from_scene(scene)

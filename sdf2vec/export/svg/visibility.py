@@ -73,7 +73,7 @@ def layers_at(scene: Scene) -> LayerSamples:
     if not scene.layers:
         return LayerSamples(np.zeros((0, 1), np.float32), np.zeros((0, 3, 1), np.float32), 1, 1)
     width, height = _small_canvas(scene)
-    grid, pixel = canvas_grid(scene, width, height), 1.0 / min(scene.width, scene.height)
+    grid, pixel = canvas_grid(scene, width, height), scene.pixel
     covered = np.zeros((len(scene.layers), height, width), np.float32)
     means = np.array([np.mean(layer.colors, axis=0) for layer in scene.layers], np.float32)
     flat = all(is_flat(layer.structure) for layer in scene.layers)
