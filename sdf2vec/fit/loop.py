@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
 from functools import cached_property, partial
@@ -40,6 +40,10 @@ JOIN_STEPS = 350  # about, of one try to join a shape to a layer
 TRIAL_LAYERS, TRIAL_STEPS, TRIAL_RATE = 4, 60, 0.5
 REFIT_STEPS = 100  # after the colours have been restricted
 ANYWHERE = Start("uniform")
+IDLE, MOST_IDLE = (
+    0.1,
+    4,
+)  # layers do less than this share of what each would have to do; that are moved at once
 restrict_colors: Callable[..., None] = deferred(
     "sdf2vec.fit.palette", "restrict"
 )  # scipy: most fits don't need it
@@ -425,12 +429,16 @@ class Fit:
         self._train(replace(stage, phase=phase))
 
     def _relocate(self, stage: Stage, share: float) -> None:
-        count = min(round(share * self.tensors.layer_count), self._replaceable)
-        if count == 0:
+        if self._replaceable == 0:
             return
         self._settle(stage)
         image = self._draw(self.tensors, stage.target)
         scores = self._scores(image, stage)
+        count = min(
+            max(round(share * self.tensors.layer_count), _idle(scores, image, stage)), self._replaceable
+        )
+        if count == 0:
+            return
         layers = self.layers
         fresh = densify(image, stage.target, count, self.tensors, layers, self.generator, stage.weights)
         relocate(self.tensors, self.optimizer, scores, fresh)
@@ -456,6 +464,13 @@ class Fit:
             score if len(group.structure) == self.settings.union else torch.full_like(score, math.inf)
             for score, group in zip(scores, self.tensors.groups, strict=True)
         ]
+
+
+def _idle(scores: Sequence[torch.Tensor], image: torch.Tensor, stage: Stage) -> int:
+    """How many layers do next to nothing for the picture, beside what is missing of it; few at a time."""
+    flat = torch.cat(list(scores))
+    missing = float((image.detach() - stage.target).square().sum())
+    return min(int((flat < IDLE * missing / len(flat)).sum()), MOST_IDLE)
 
 
 def _join_groups(tensors: SceneTensors, optimizer: Adam, fresh: list[Group]) -> None:
