@@ -23,7 +23,7 @@ from ..fit.presets import PRESETS
 from ..flip import flip
 from ..graph import components_of
 from ..lower.torch import compile_torch
-from ..metrics import psnr
+from ..metrics import psnr, ssim
 from ..operation import VEC2, VEC4
 from ..render import reference
 from ..render.tensors import from_scene
@@ -284,6 +284,14 @@ def windowed(seed: int) -> Outcome:
     except ValueError:
         return Outcome(True)
     return Outcome(False)
+
+
+def structured(seed: int) -> Outcome:
+    """Ours by SSIM, and judged by it."""
+    pixels = pictures.tiny(seed)
+    image, target = shown(scene_of(pixels, 5, seed, loss="ssim", kind="circle")), target_of(pixels)
+    bare = target.mean(dim=(1, 2), keepdim=True).expand_as(target)
+    return Outcome(not ssim(image, target) > ssim(bare, target), float(flip(image, target)))
 
 
 # --- rates --------------------------------------------------------------------------------------------------
