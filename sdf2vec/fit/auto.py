@@ -214,10 +214,10 @@ class Drawing:
             self._announce_compiling()
             self.scene = grounded(self.scene, self.sizes.joint, self.search)
             for made in grow(self.scene, self.sizes, self.search, self.settings.most, self.floor):
-                self.scene = made.scene
                 if self._is_no_drawing(made):
-                    self.gave_up = True
+                    self.gave_up = not self._was_good(made)
                     break
+                self.scene = made.scene
             if not self.gave_up:
                 self._finish()
         except Stopped:
@@ -241,6 +241,10 @@ class Drawing:
             return False
         most = UNLIKELY * self.settings.most if self.flat else SOFT_MOST
         return made.scene.layer_count + needed(made, self.flat, self.floor) > most
+
+    def _was_good(self, made: Round) -> bool:
+        """Whether all was found before a round that only begins to follow the steps of a jagged edge."""
+        return self.settings.target_psnr is None and made.before <= GOOD
 
     def _announce_compiling(self) -> None:
         kinds = replace(self.scene, groups=empty_groups(self.search.layers))

@@ -6,6 +6,7 @@ from importlib import import_module
 import numpy as np
 import pytest
 import torch
+from PIL import Image, ImageDraw
 
 from sdf2vec import Scene, Sdf2vecError, fit, fitted
 from sdf2vec.engines import resvg
@@ -15,7 +16,7 @@ from sdf2vec.fit.joining import Search
 from sdf2vec.fit.one_more import gain_of_one_more
 from sdf2vec.fit.settings import settings_of
 from sdf2vec.fit.surroundings import View
-from sdf2vec.image import Picture, resize
+from sdf2vec.image import Picture, load, resize
 from sdf2vec.quality import quality
 from tests.fit.fitting import RED, remember
 
@@ -232,3 +233,12 @@ def test_a_soft_picture_takes_few_shapes():
     assert not is_flat(picture)
     assert found.scene.shape_count <= 8  # its edge is straight, ours a sigmoid
     assert quality(found.scene, picture).psnr >= 35
+
+
+def test_a_jagged_disc_is_few_shapes():
+    """Drawn without antialiasing: its steps are not followed with as many shapes as there may be."""
+    image = Image.new("RGB", (200, 200), "white")
+    ImageDraw.Draw(image).ellipse((60, 50, 150, 140), fill=(220, 20, 30))
+    scene = fitted(np.asarray(image), "auto").scene
+    assert scene.shape_count <= 3
+    assert quality(scene, load(np.asarray(image))).psnr > 35
