@@ -31,8 +31,8 @@ from .shader import most_shapes
 from .svg import svg
 
 FALLBACK = 1 << 20  # pixels
-NEAR, MANY = 52.0, 256  # dB that the page's scene is from the one it was made of, where it has so many shapes
-SLOPE, NEAREST = 36.0, 105.0  # fewer can have more: by ten times fewer, and at most
+NEAR, MANY = 57.0, 256  # dB that the page's scene is from the one it was made of, where it has so many shapes
+SLOPE, NEAREST = 32.0, 105.0  # fewer can have more: by ten times fewer, and at most
 POLICY = "what the page may do"  # where the template has it
 SCRIPT = re.compile(r'<script type="module">(.*?)</script>', re.DOTALL)
 STYLE = re.compile(r"<style>(.*?)</style>", re.DOTALL)
