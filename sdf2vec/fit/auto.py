@@ -18,11 +18,12 @@ from msgspec import structs
 from ..image import Picture
 from ..paints import FLAT as ONE_COLOR
 from ..quality import psnr_of, quality
-from ..render.tensors import SceneTensors, to_scene
+from ..render.tensors import SceneTensors, from_scene, to_scene
 from ..scene import Scene
 from ..threads import threads_of_its_own
 from .backends import CPU, choose
 from .byte_budget import SLOPE, Share, within
+from .description import description_length
 from .digits import concise, fit_concisely
 from .initialization import Layers, background_of, empty_groups
 from .joining import Search
@@ -34,6 +35,7 @@ from .ramps import grounded
 from .settings import AUTO, Settings, preset_of
 from .simplify import simplified
 from .sparse import FLOOR, Round, Sizes, error_of, finished, grow, needed, pruned
+from .surroundings import View
 from .views import scaled, view_of
 
 SEARCH, JOINT, LAST = 56, 128, 320  # pixels squared
@@ -47,6 +49,11 @@ UNLIKELY = 1.5  # of the most shapes: a picture that needs more is no drawing
 SOFT_MOST = 16  # shapes of a soft drawing
 GOOD = 10**-3.5  # mean squared error, 35 dB, of what is surely found
 DOMINANT = 0.15  # share of the most common colour, of a picture that has a ground
+MORE = (
+    2,
+    4,
+    12,
+)  # times the shapes found that are fitted where these alone are not the drawing; then, as many as allowed
 TRIES = 4  # fits for a target
 
 
@@ -118,9 +125,28 @@ def _few(picture: Picture, settings: Settings, callback: Callback) -> Fitted | N
             return None
         if drawing.error <= (drawing.floor if settings.target_psnr else GOOD):
             return Fitted(found, _counted(found))
+        if settings.target_psnr is None:
+            enough = _enough(picture, settings, found, drawing.sizes.last, callback)
+            return Fitted(enough, _counted(enough))
     painted = fit_concisely(picture, _going_on(settings, found), callback)
     as_wanted = settings.shapes == AUTO or (settings.shapes == found.shape_count and settings.loss is None)
     return _told(_nearest([painted, *([found] if as_wanted else [])], picture), picture, settings)
+
+
+def _enough(picture: Picture, settings: Settings, found: Scene, view: View, callback: Callback) -> Scene:
+    """What goes on from what was found with ever more shapes, as long as that makes the description shorter."""
+    best, shortest = found, description_length(from_scene(found), view)
+    for times in (*MORE, math.inf):
+        count = min(max(times * found.shape_count, FEW), settings.most)
+        if count <= best.shape_count:
+            continue
+        more = structs.replace(settings, start=best if best.layers else None, shapes=int(count))
+        tried = fit_concisely(picture, more, callback)
+        length = description_length(from_scene(tried), view)
+        if length >= shortest:
+            break
+        best, shortest = tried, length
+    return best
 
 
 def pixel_of(picture: Picture) -> float:

@@ -25,6 +25,7 @@ from ..render.reference import rows_coverage
 from ..render.tensors import Group
 from ..units import COLOR, FALLOFF, OPACITY, SMOOTHNESS, Placed
 from .initialization import start_of
+from .laying import Laid
 from .levenberg import Numbers, Problem, descend
 from .surroundings import Surroundings
 
@@ -319,23 +320,19 @@ def _shape(kind: str, row: torch.Tensor) -> dict[str, torch.Tensor]:
 
 
 def _rows(structure: Structure, placed: Placed) -> torch.Tensor:
-    """Sharp opaque layers of one shape at some places, [N, U]."""
+    """Sharp opaque layers of one white shape at some places, [N, U]."""
     count = len(placed.sizes)
     looks = {
         unit.name: torch.full((count, width), value)
-        for unit, width, value in ((OPACITY, 1, 1.0), (FALLOFF, 1, 0.0), (COLOR, 3, 0.0))
+        for unit, width, value in ((OPACITY, 1, 1.0), (FALLOFF, 1, 0.0), (COLOR, 3, 1.0))
     }
     return torch.cat([start_of(slot.parameter, placed, looks) for slot in slots(structure)], dim=1)
 
 
 def _misses(structure: Structure, masks: Sequence[Mask], around: Surroundings, blur: float) -> Problem:
-    """How far the coverage of each layer of one shape is from its mask, [G, 1, P]."""
-    strengths = torch.stack([mask.strength for mask in masks])
-    amounts = torch.stack([mask.amount for mask in masks])
+    """How far the coverage of each layer of one white shape is from its mask."""
+    strengths = torch.stack([mask.strength for mask in masks])[:, None]
+    amounts = torch.stack([mask.amount for mask in masks])[:, None]
     x, y, pixel = around.points
-
-    def wrong(rows: torch.Tensor) -> torch.Tensor:
-        cover, _ = rows_coverage(structure, rows, around.scene.compositing, x, y, pixel * blur)
-        return (strengths * cover - amounts)[:, None]
-
-    return Problem(wrong, len(x))
+    points = x, y, pixel * blur
+    return Laid(structure, around.scene.compositing, points, torch.zeros(1, len(x)), strengths, amounts)

@@ -1,13 +1,13 @@
 """Least squares by damped Gauss-Newton steps (Levenberg 1944, Marquardt 1963), many candidates at a time.
 
-What is wrong at a point depends on the numbers of a candidate and on nothing at other points. So all derivatives come
-from one pass backward in which every point has numbers of its own.
+What is wrong at a point depends on the numbers of a candidate and on nothing at other points. So without kernels all
+derivatives come from one pass backward in which every point has numbers of its own.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import NamedTuple
+from typing import NamedTuple, Protocol
 
 import torch
 
@@ -17,15 +17,39 @@ HARDLY, PATIENCE = 1e-3, 6  # share of the error; steps
 TINY = 1e-9
 
 
-class Problem(NamedTuple):
-    """What is wrong with candidates, [G, C, P], from their rows [G, U, P or 1]; and the number of points."""
+class Problem(Protocol):
+    """How wrong candidates are, from their rows [G, U]."""
+
+    def errors(self, rows: torch.Tensor) -> torch.Tensor:
+        """Mean squares [G]."""
+
+    def normal(self, rows: torch.Tensor, free: torch.Tensor) -> tuple[torch.Tensor, torch.Tensor]:
+        """The normal equations by the free numbers: the matrices [G, F, F], and the right sides [G, F]."""
+
+
+class Dense(NamedTuple):
+    """What is wrong, [G, C, P], from rows [G, U, P or 1]; and the number of points."""
 
     wrong: Callable[[torch.Tensor], torch.Tensor]
     points: int
 
     def errors(self, rows: torch.Tensor) -> torch.Tensor:
-        """Mean squares [G] for rows [G, U]."""
+        """Mean squares [G]."""
         return self.wrong(rows[..., None]).square().mean(dim=(1, 2))
+
+    def normal(self, rows: torch.Tensor, free: torch.Tensor) -> tuple[torch.Tensor, torch.Tensor]:
+        """The normal equations, by autograd."""
+        wrong, slopes = self._slopes(rows, free)
+        return slopes @ slopes.mT, (slopes @ wrong[..., None])[..., 0]
+
+    def _slopes(self, rows: torch.Tensor, free: torch.Tensor) -> tuple[torch.Tensor, torch.Tensor]:
+        """Residuals [G, C · P] and their derivatives by the free numbers [G, F, C · P]."""
+        spread = rows[..., None].repeat(1, 1, self.points).requires_grad_()
+        with torch.enable_grad():
+            wrong = self.wrong(spread)
+            sums = wrong.sum(dim=(0, 2)).unbind()
+        channels = [torch.autograd.grad(total, spread, retain_graph=True)[0][:, free] for total in sums]
+        return wrong.detach().flatten(1), torch.stack(channels, dim=2).flatten(2)
 
 
 class Numbers(NamedTuple):
@@ -66,19 +90,8 @@ def descend(
 
 def _step(rows: torch.Tensor, problem: Problem, free: torch.Tensor, damping: torch.Tensor) -> torch.Tensor:
     """How far the free numbers are too large by the damped normal equations, [G, F]."""
-    wrong, slopes = _slopes(rows, problem, free)
-    normal = slopes @ slopes.mT
+    normal, right = problem.normal(rows, free)
     scale = normal.diagonal(dim1=1, dim2=2)
     normal = normal + torch.diag_embed(scale * damping[:, None] + TINY)
-    step: torch.Tensor = torch.linalg.solve(normal, slopes @ wrong[..., None])[..., 0]
+    step: torch.Tensor = torch.linalg.solve(normal, right)
     return step
-
-
-def _slopes(rows: torch.Tensor, problem: Problem, free: torch.Tensor) -> tuple[torch.Tensor, torch.Tensor]:
-    """Residuals [G, C · P] and their derivatives by the free numbers [G, F, C · P]."""
-    spread = rows[..., None].repeat(1, 1, problem.points).requires_grad_()
-    with torch.enable_grad():
-        wrong = problem.wrong(spread)
-        sums = wrong.sum(dim=(0, 2)).unbind()
-    channels = [torch.autograd.grad(total, spread, retain_graph=True)[0][:, free] for total in sums]
-    return wrong.detach().flatten(1), torch.stack(channels, dim=2).flatten(2)

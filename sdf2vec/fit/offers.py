@@ -24,7 +24,7 @@ from ..scene import Color
 from .candidates import Opening, alone, openings
 from .initialization import straight
 from .joining import Search, layer_of
-from .levenberg import Problem, descend
+from .levenberg import descend
 from .surroundings import Surroundings
 
 label: Callable[..., Any] = deferred("skimage.measure", "label")
@@ -34,13 +34,18 @@ BINS = 8  # of a channel, when colours are counted
 NEAR = 0.02  # squared distance of colours that are one
 LEAST = 0.02  # share of all that is missing, of a colour that is looked for
 REGION = 0.1  # of the greatest gain: what belongs to a region
+PARTS, PART = 5, 0.02  # parts of a region that are looked at alone; share of it that each has at least
 EDGE = 0.3  # least part of a pixel that is wanted, at a region's edge
 STARTS = 6  # of a kind in an opening
 MOST = 12  # shapes that are refined at once
 WEAKEST = 0.05  # of the greatest gain
 APART, ALIKE = 0.15, 0.4  # overlap below which two shapes are apart; above which they are tries of one
 EACH, STEPS = 2, 12  # shapes of a kind that are refined in a place; steps of each
-ROUGH, CLEAN = 0.3, 0.06  # what is left of a region, at most, by a shape that may explain it; that does
+ROUGH, NEARLY_CLEAN, CLEAN = (
+    0.3,
+    0.12,
+    0.06,
+)  # what is left of a region, at most, by a shape that may explain it; that does
 PRICE = 0.02  # of a number, in logarithms of what is left
 CUT, CUT_KINDS = 4, 2  # shapes from which others are cut; kinds of these
 LEAST_GAIN = 0.02  # of what is missing, by a shape that is worth its numbers
@@ -80,6 +85,19 @@ class Region:
         counts = (beside | (opening.mask.gain <= 0.0)).float()
         opening = replace(opening, mask=opening.mask.only(counts))
         return cls(opening, wanted, torch.from_numpy(label(inside)).flatten(), counts)
+
+    def split(self) -> Iterator[Region]:
+        """Each of its parts alone, where it has several: the others neither count nor are wanted."""
+        amounts = torch.bincount(self.labels, weights=self.wanted)
+        amounts[0] = 0.0
+        numbers = amounts.argsort(descending=True)[:PARTS].tolist()
+        numbers = [number for number in numbers if amounts[number] > PART * amounts.sum()]
+        for number in numbers if len(numbers) > 1 else ():
+            own = self.labels == number
+            others = (self.wanted > 0) & ~own
+            counts = self.counts * ~others
+            opening = replace(self.opening, mask=self.opening.mask.only(counts))
+            yield Region(opening, self.wanted * own, self.labels * own, counts)
 
     def under(self, cover: torch.Tensor) -> int:
         """The number of the part that a shape [P] covers most of; 0 where it covers none."""
@@ -163,7 +181,8 @@ def _found(
         offer for order, place in around.items() for offer in _searched(place, order, colors[order], search)
     ]
     gaining = sorted(
-        (offer for offer in every if offer.gain > 0), key=lambda offer: (offer.left > ROUGH, -offer.gain)
+        (offer for offer in every if offer.gain > 0),
+        key=lambda offer: (offer.left > NEARLY_CLEAN, offer.left > ROUGH, -offer.gain),
     )
     best = [_best(tries, floor) for tries in _refined(_tries(gaining), around, search) if tries]
     cut = (_cut(base, around, search) for base in _unfit(every, best, around))
@@ -190,11 +209,10 @@ def _searched(
 ) -> Iterator[Offer]:
     """All that shapes in some colours come to from many starts."""
     here = torch.tensor([order])
-    regions = [
-        Region.of(opening, around)
-        for color in colors
-        for opening in alone(here, color, search.falloff[0], around)
-    ]
+    regions = []
+    for color in colors:
+        near, eager = (Region.of(o, around) for o in alone(here, color, search.falloff[0], around))
+        regions += [near, eager, *near.split()]
     openings, wanted = [region.opening for region in regions], [region.wanted for region in regions]
     proposer = search.proposer(around)
     for kind in proposer.kinds if openings else ():
@@ -211,7 +229,7 @@ def _offers_of(
     """What layers with these rows [N, U] gain; None for those that cover nothing of their region."""
     structure = like.structure
     before = around.residual().square().mean(0).flatten()
-    after = around.problem(structure).wrong(rows[..., None]).square().mean(1)
+    after = around.wrong(layer_of(structure, like.order, rows)).square().mean(1)
     covers, _ = rows_coverage(structure, rows[..., None], around.scene.compositing, *around.points)
     made: list[Offer | None] = []
     for row, region, cover, rest in zip(rows, regions, covers, after, strict=True):
@@ -234,14 +252,14 @@ def _tries(found: Sequence[Offer]) -> list[list[Offer]]:
     for offer in found:
         if len(seeds) == MOST or offer.gain < WEAKEST * found[0].gain:
             break
-        rivals = (seed for seed in seeds if seed.region is offer.region)
+        rivals = (seed for seed in seeds if seed.place[:2] == offer.place[:2])
         if all(_overlap(offer.cover, seed.cover) < APART for seed in rivals):
             seeds.append(offer)
     groups = []
     for seed in seeds:
         kinds: dict[str, list[Offer]] = defaultdict(list)
         for offer in found:
-            if offer.region is seed.region and _likeness(offer.cover, seed.cover) > ALIKE:
+            if offer.place[:2] == seed.place[:2] and _likeness(offer.cover, seed.cover) > ALIKE:
                 kinds[offer.kind].append(offer)
         groups.append([offer for own in kinds.values() for offer in own[:EACH]])
     return groups
@@ -292,16 +310,10 @@ def _descended(
     """Layers of one structure, each for its region, after some steps of all their numbers; None for what is no gain."""
     structure = layers[0].structure
     numbers = search.numbers(around, structure, lambda slot: True)
-    problem = _counted(around.problem(structure), [region.counts for region in regions])
+    problem = around.problem(structure, torch.stack([region.counts for region in regions]))
     rows = torch.cat([layer.rows() for layer in layers])
     rows, _ = descend(rows, problem, numbers, STEPS, search.tick)
     return _offers_of(rows, layers[0], regions, around)
-
-
-def _counted(problem: Problem, counts: Sequence[torch.Tensor]) -> Problem:
-    """The problem of candidates for each of which only some points count."""
-    weights = torch.stack(list(counts))[:, None]
-    return Problem(lambda rows: problem.wrong(rows) * weights, problem.points)
 
 
 def _apart(ranked: Sequence[Offer]) -> list[Offer]:

@@ -13,7 +13,10 @@ import torch
 from ..layer import ROW_OPACITY, Structure
 from ..render.reference import canvas, composite_points, lay, rows_coverage
 from ..render.tensors import Group, SceneTensors
-from .levenberg import Problem
+from .laying import Laid
+from .levenberg import Dense, Problem
+
+MOST_COMPILED = 2  # shapes in a layer: of more there are too many structures to compile kernels for
 
 Points = tuple[torch.Tensor, torch.Tensor, torch.Tensor]  # x [P], y [P], size of a pixel []
 
@@ -80,14 +83,27 @@ class Surroundings:
         """Height and width in pixels."""
         return self.target.shape[1], self.target.shape[2]
 
-    def problem(self, structure: Structure) -> Problem:
-        """What is wrong with layers of a structure in the place of this one, weighted."""
+    def problem(self, structure: Structure, counts: torch.Tensor | None = None) -> Problem:
+        """What is wrong with layers of a structure in the place of this one, weighted; `counts` [G, P]: by how much
+        each point counts for each of them.
+        """
+        if len(structure) > MOST_COMPILED:
+            weights = 1.0 if counts is None else counts[:, None]
+            return Dense(lambda rows: self._wrong_at(structure, rows) * weights, len(self.weights))
+        weights = self.weights * (torch.ones(1, len(self.weights)) if counts is None else counts)
+        channels = len(self.target)
+        scale = (self.light - self.dark)[:channels] * weights[:, None]
+        offset = (self.target.flatten(1) - self.dark[:channels]) * weights[:, None]
+        return Laid(structure, self.scene.compositing, self.points, self.below[:channels], scale, offset)
 
-        def wrong(rows: torch.Tensor) -> torch.Tensor:
-            cover, color = rows_coverage(structure, rows, self.scene.compositing, *self.points)
-            return self.wrong_with(cover, color, rows[:, ROW_OPACITY - 1])
+    def wrong(self, layers: Group) -> torch.Tensor:
+        """What is wrong with each of some layers in the place of this one, weighted, [G, C, P]."""
+        return self._wrong_at(layers.structure, layers.rows()[..., None])
 
-        return Problem(wrong, len(self.weights))
+    def _wrong_at(self, structure: Structure, rows: torch.Tensor) -> torch.Tensor:
+        """The same from rows [G, U, P or 1]."""
+        cover, color = rows_coverage(structure, rows, self.scene.compositing, *self.points)
+        return self.wrong_with(cover, color, rows[:, ROW_OPACITY - 1])
 
     def wrong_with(self, cover: torch.Tensor, color: torch.Tensor, opacity: torch.Tensor) -> torch.Tensor:
         """The same [G, C, P] from coverage [G, P], colours [G, 3, P or 1] and opacities [G, P or 1]."""

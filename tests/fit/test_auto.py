@@ -1,6 +1,7 @@
 """No more shapes than a picture needs: of pictures that resvg draws, whose shapes are known; and what is reported."""
 
 import math
+from dataclasses import replace
 from importlib import import_module
 
 import numpy as np
@@ -10,6 +11,7 @@ from PIL import Image, ImageDraw
 
 from sdf2vec import Scene, Sdf2vecError, fit, fitted
 from sdf2vec.engines import resvg
+from sdf2vec.fit import auto
 from sdf2vec.fit.auto import ground_of, is_flat
 from sdf2vec.fit.initialization import Layers
 from sdf2vec.fit.joining import Search
@@ -18,6 +20,7 @@ from sdf2vec.fit.settings import settings_of
 from sdf2vec.fit.surroundings import View
 from sdf2vec.image import Picture, load, resize
 from sdf2vec.quality import quality
+from sdf2vec.scene import Layer, Shape
 from tests.fit.fitting import RED, remember
 
 WHITE = '<rect width="100%" height="100%" fill="white"/>'
@@ -82,6 +85,14 @@ def test_what_is_found_is_as_simple_as_drawn(drawn):
     assert np.allclose((x * 96 + 48, y * 96 + 48), (58, 59), atol=0.3)
     assert np.allclose((half_width * 96, half_height * 96), (20, 15), atol=0.3)
     assert np.allclose(shape.color, (0x10 / 255, 0xA0 / 255, 0x50 / 255), atol=0.01)
+
+
+def test_bars_beside_each_other_are_found_one_by_one(drawn):
+    """Not one box over all of them with gaps cut out."""
+    bars = "".join(
+        f'<rect x="16" y="{14 + 17 * i}" width="64" height="14" fill="#d1c4e9"/>' for i in range(4)
+    )
+    assert kinds_of(fit(drawn(WHITE + bars))) == ["box"] * 4
 
 
 def test_a_ring_is_one_layer(drawn):
@@ -242,3 +253,29 @@ def test_a_jagged_disc_is_few_shapes():
     scene = fitted(np.asarray(image), "auto").scene
     assert scene.shape_count <= 3
     assert quality(scene, load(np.asarray(image))).psnr > 35
+
+
+def test_a_drawing_of_other_things_takes_more_shapes_while_its_description_gets_shorter(monkeypatch):
+    """Of 2 shapes found: 4 bring it to within a level, so that 8 can't pay for themselves."""
+    asked = []
+
+    def fitted_with(picture, settings, callback):
+        asked.append(settings.shapes)
+        return _hidden(settings.shapes, 0.5 - 1 / 255)
+
+    monkeypatch.setattr(auto, "fit_concisely", fitted_with)
+    picture = Picture(np.full((64, 64, 3), 0.5, np.float32))
+    picture.pixels[:, :32] += 1 / 255
+    view = View(torch.from_numpy(picture.pixels).permute(2, 0, 1), None)
+    found = _hidden(2, 0.3)
+    found = replace(found, background=(0.3, 0.5, 0.5))
+    enough = auto._enough(picture, settings_of(), found, view, lambda progress: False)
+    assert asked == [4, 8]
+    assert enough.shape_count == 4
+
+
+def _hidden(count, level):
+    """A grey picture with so many discs that are not seen."""
+    grey = (level, level, level)
+    disc = Layer((Shape("circle", (0.0, 0.0, 0.1), grey),))
+    return Scene(64, 64, (disc,) * count, grey)

@@ -8,8 +8,13 @@ import numpy as np
 import pytest
 import torch
 
-from sdf2vec.fit.levenberg import Numbers, Problem, descend
+from sdf2vec.fit import surroundings
+from sdf2vec.fit.levenberg import Dense, Numbers, descend
 from sdf2vec.fit.regions import ellipses
+from sdf2vec.fit.surroundings import MOST_COMPILED, Surroundings, View
+from sdf2vec.layer import Part, row_width
+from sdf2vec.render.tensors import from_scene
+from sdf2vec.scene import Layer, Scene, Shape
 
 
 def test_a_line_is_found_in_one_undamped_step_or_a_few_damped_ones():
@@ -17,7 +22,7 @@ def test_a_line_is_found_in_one_undamped_step_or_a_few_damped_ones():
     x = torch.linspace(-1.0, 1.0, 7)
     wanted = torch.tensor([[2.0, -1.0], [0.5, 3.0]])
     heights = wanted[:, :1] * x + wanted[:, 1:]
-    problem = Problem(lambda rows: (rows[:, 0] * x + rows[:, 1] - heights)[:, None], len(x))
+    problem = Dense(lambda rows: (rows[:, 0] * x + rows[:, 1] - heights)[:, None], len(x))
     free = Numbers(torch.tensor([0, 1]), torch.tensor([9.0, 9.0]), lambda rows: None)
     rows, errors = descend(torch.zeros(2, 2), problem, free, 12, lambda error: None)
     assert rows.numpy() == pytest.approx(wanted.numpy(), abs=1e-3)
@@ -26,7 +31,7 @@ def test_a_line_is_found_in_one_undamped_step_or_a_few_damped_ones():
 
 def test_a_number_that_is_not_free_stays():
     x = torch.linspace(-1.0, 1.0, 7)
-    problem = Problem(lambda rows: (rows[:, 0] * x + rows[:, 1] - 1.0)[:, None], len(x))
+    problem = Dense(lambda rows: (rows[:, 0] * x + rows[:, 1] - 1.0)[:, None], len(x))
     free = Numbers(torch.tensor([1]), torch.tensor([0.1]), lambda rows: None)
     rows, _ = descend(torch.tensor([[0.25, 0.0]]), problem, free, 3, lambda error: None)
     assert rows[0].tolist() == pytest.approx([0.25, 0.3])  # a tenth in each step
@@ -55,3 +60,34 @@ def test_two_squares_give_also_one_ellipse_through_both_that_ends_with_them():
 
 def test_where_nothing_is_wanted_there_is_no_ellipse():
     assert ellipses(np.full((8, 8), -1.0, np.float32)) == []
+
+
+STRUCTURES = [
+    (Part("circle"),),
+    (Part("triangle", "linear"),),
+    (Part("displaced"),),
+    (Part("ellipse"), Part("box", join="subtraction")),
+]
+
+
+@pytest.mark.parametrize("structure", STRUCTURES, ids=lambda parts: "-".join(part.kind for part in parts))
+@pytest.mark.parametrize("channels", [3, 4])
+@pytest.mark.parametrize("counted", [False, True])
+def test_normal_equations_of_kernels_are_those_of_autograd(structure, channels, counted, monkeypatch):
+    """Among other layers, at a size that fills no block of pixels."""
+    draw = torch.Generator().manual_seed(3)
+    below = Layer((Shape("circle", (-0.1, 0.0, 0.3), (0.9, 0.2, 0.1)),), 0.1, 0.8)
+    above = Layer((Shape("circle", (0.2, 0.1, 0.25), (0.1, 0.5, 0.7)),), 0.05, 0.6)
+    scene = from_scene(Scene(61, 50, (below, below, above), (0.4, 0.5, 0.6)))
+    view = View(torch.rand(channels, 50, 61, generator=draw), torch.rand(50, 61, generator=draw))
+    around = Surroundings.of(scene, 1, view)
+    rows = 0.05 + 0.3 * torch.rand(5, row_width(structure), generator=draw)
+    counts = torch.rand(5, 50 * 61, generator=draw) if counted else None
+    free = torch.tensor([number for number in range(rows.shape[1]) if number != 2])
+    assert len(structure) <= MOST_COMPILED
+    kernels = around.problem(structure, counts)
+    monkeypatch.setattr(surroundings, "MOST_COMPILED", 0)
+    autograd = around.problem(structure, counts)
+    assert kernels.errors(rows).numpy() == pytest.approx(autograd.errors(rows).numpy(), rel=1e-5)
+    for found, wanted in zip(kernels.normal(rows, free), autograd.normal(rows, free), strict=True):
+        assert found.numpy() == pytest.approx(wanted.numpy(), rel=1e-3, abs=1e-5 * float(wanted.abs().max()))

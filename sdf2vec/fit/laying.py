@@ -1,0 +1,109 @@
+"""Problems of least squares whose candidates are layers laid on one picture: solved by kernels."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from functools import cache, cached_property
+
+import numpy as np
+import torch
+from torch.nn.functional import pad
+
+from ..arrays import Float32Array, Float64Array, IntArray
+from ..graph import gradient
+from ..kernel_cache import Assembly, Entry
+from ..layer import Formula, Structure
+from ..lower.block import Block
+from ..lower.llvm import assembled, forward
+from ..render.kernels import drawn
+from ..render.tiling import PIXELS
+from ..threads import in_threads, threads
+from .normal_kernels import add_products, sum_squares
+
+
+@cache
+def entries(structure: Structure, compositing: str, channels: int) -> tuple[Entry, Entry]:
+    """What a layer makes of what is below it: a row a channel. The same, followed by the derivatives of the first
+    channel by each of the layer's numbers, then those of the second, ….
+    """
+    block = drawn(Formula.of(structure), "laid", compositing, channels)
+    slopes = [slope for output in block.outputs for slope in gradient(output, block.uniforms[1:])]
+    sloped = replace(block, name="sloped", outputs=(*block.outputs, *slopes))
+    assembly = Assembly(assembled([_text(each, channels) for each in (block, sloped)]))
+    return assembly["laid"], assembly["sloped"]
+
+
+def _text(block: Block, channels: int) -> str:
+    return forward(block, {"x": 1, "y": 1, "below": channels, "found": len(block.outputs)}, PIXELS)
+
+
+@dataclass(frozen=True)
+class Laid:
+    """Candidates for a layer on what is below it: what is wrong is `scale` · laid − `offset`.
+
+    The points: x [P], y [P], the size of a pixel []. `scale` and `offset` may be those of each candidate, or of all.
+    """
+
+    structure: Structure
+    compositing: str
+    points: tuple[torch.Tensor, torch.Tensor, torch.Tensor]
+    below: torch.Tensor  # [C, P]
+    scale: torch.Tensor  # [G or 1, C, P]
+    offset: torch.Tensor  # [G or 1, C, P]
+
+    def errors(self, rows: torch.Tensor) -> torch.Tensor:
+        """Mean squares [G] for rows [G, U]."""
+        sums = np.zeros(len(rows))
+        self._run(sum_squares, 0, len(self.below), rows, sums)
+        return torch.from_numpy(sums / self.below.numel()).to(rows.dtype)
+
+    def normal(self, rows: torch.Tensor, free: torch.Tensor) -> tuple[torch.Tensor, torch.Tensor]:
+        """The normal equations by the free numbers."""
+        count, width = rows.shape
+        normal, right = np.zeros((count, len(free), len(free))), np.zeros((count, len(free)))
+        values = len(self.below) * (1 + width)
+        self._run(add_products, 1, values, rows, free.numpy(), normal, right)
+        normal += np.tril(normal, -1).transpose(0, 2, 1)
+        return torch.from_numpy(normal).to(rows.dtype), torch.from_numpy(right).to(rows.dtype)
+
+    def _run(
+        self,
+        kernel: Callable[..., object],
+        entry: int,
+        values: int,
+        rows: torch.Tensor,
+        *rest: Float64Array | IntArray,
+    ) -> None:
+        """Calls a kernel with scratch for so many values of a pixel."""
+        function = entries(self.structure, self.compositing, len(self.below))[entry].address
+        scratch = np.empty((threads(), values, PIXELS), np.float32)
+        numbers = _array(torch.cat([self.points[2].expand(len(rows), 1), rows], dim=1))
+        given = (numbers, *self._blocks, self._which(len(rows)), *self._targets, *rest)
+        in_threads(kernel, scratch, function, *given)
+
+    def _which(self, count: int) -> IntArray:
+        """Which scale and offset each candidate has."""
+        return np.arange(count, dtype=np.int64) if len(self.scale) > 1 else np.zeros(count, np.int64)
+
+    @cached_property
+    def _blocks(self) -> Sequence[Float32Array]:
+        """x, y [B, pixels] and what is below [B, C, pixels]."""
+        x, y, _ = self.points
+        return _blocked(x), _blocked(y), np.ascontiguousarray(_blocked(self.below).swapaxes(0, 1))
+
+    @cached_property
+    def _targets(self) -> Sequence[Float32Array]:
+        """Scale and offset, [M, B, C, pixels]."""
+        both = (_blocked(each) for each in (self.scale, self.offset))
+        return tuple(np.ascontiguousarray(each.swapaxes(1, 2)) for each in both)
+
+
+def _blocked(tensor: torch.Tensor) -> Float32Array:
+    """Values of points [..., P] in blocks [..., B, pixels], the last filled up with 0."""
+    missing = -tensor.shape[-1] % PIXELS
+    return _array(pad(tensor, (0, missing)).unflatten(-1, (-1, PIXELS)))
+
+
+def _array(tensor: torch.Tensor) -> Float32Array:
+    return np.ascontiguousarray(tensor.detach().numpy(), dtype=np.float32)
