@@ -266,7 +266,8 @@ class Drawing:
         if self.settings.shapes != AUTO:
             return False
         most = UNLIKELY * self.settings.most if self.flat else SOFT_MOST
-        return made.scene.layer_count + needed(made, self.flat, self.floor) > most
+        grown = made.scene.layer_count > self.scene.layer_count  # what only became simpler says nothing
+        return grown and made.scene.layer_count + needed(made, self.flat, self.floor) > most
 
     def _was_good(self, made: Round) -> bool:
         """Whether all was found before a round that only begins to follow the steps of a jagged edge."""

@@ -17,9 +17,11 @@ from sdf2vec.fit.initialization import Layers
 from sdf2vec.fit.joining import Search
 from sdf2vec.fit.one_more import gain_of_one_more
 from sdf2vec.fit.settings import settings_of
+from sdf2vec.fit.sparse import Round
 from sdf2vec.fit.surroundings import View
 from sdf2vec.image import Picture, load, resize
 from sdf2vec.quality import quality
+from sdf2vec.render.tensors import from_scene
 from sdf2vec.scene import Layer, Shape
 from tests.fit.fitting import RED, remember
 
@@ -272,6 +274,14 @@ def test_a_drawing_of_other_things_takes_more_shapes_while_its_description_gets_
     enough = auto._enough(picture, settings_of(), found, view, lambda progress: False)
     assert asked == [4, 8]
     assert enough.shape_count == 4
+
+
+def test_a_round_that_only_takes_layers_away_does_not_end_the_search():
+    """Its error may be a little higher than before: that says nothing about how many more are needed."""
+    drawing = auto.Drawing(noise(), settings_of(), lambda progress: False, flat=True)
+    drawing.scene = from_scene(_hidden(13, 0.5))
+    assert not drawing._is_no_drawing(Round(from_scene(_hidden(12, 0.5)), 2e-4, 1e-4))
+    assert drawing._is_no_drawing(Round(from_scene(_hidden(14, 0.5)), 2e-4, 1e-4))
 
 
 def _hidden(count, level):
