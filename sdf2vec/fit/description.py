@@ -9,24 +9,17 @@ from __future__ import annotations
 import torch
 
 from ..layer import row_width
-from ..render import fused
 from ..render.tensors import SceneTensors
-from .surroundings import View
+from .surroundings import View, residual_of
 
 BITS = 10  # of a number
-LEVELS = 255
+WHITE = 255  # levels
 
 
 @torch.no_grad()
 def description_length(scene: SceneTensors, view: View) -> float:
     """Bits for the scene and for what it leaves of a picture."""
     numbers = sum(len(group.order) * row_width(group.structure) for group in scene.groups)
-    return BITS * numbers + _residual_bits(scene, view)
-
-
-def _residual_bits(scene: SceneTensors, view: View) -> float:
-    channels, height, width = view.target.shape
-    wrong = fused.composite(scene, width, height, channels).clamp(0.0, 1.0) - view.target
-    wrong = wrong if view.weights is None else wrong * view.weights
-    counts = (LEVELS * wrong).round().unique(return_counts=True)[1].double()
-    return float(-(counts * (counts / counts.sum()).log2()).sum())
+    levels = (WHITE * residual_of(scene, view)).round()
+    counts = levels.unique(return_counts=True)[1].double()
+    return BITS * numbers - float((counts * (counts / counts.sum()).log2()).sum())

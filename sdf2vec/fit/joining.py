@@ -1,8 +1,8 @@
 """Shapes joined to layers by trial: cut out of them, added to them, or intersected with them.
 
 Which join helps is a decision, not a number that could be descended; so candidates are trained for some steps, and
-the best is kept where the error falls by more than its numbers are worth. All of it happens at low resolution by the
-dense renderer: kernels would have to be compiled for every structure.
+the best is kept where the error falls by more than its numbers are worth. All of it happens at low resolution, and
+what is seen around a layer comes from the dense renderer: structures are many, and each is looked at for a moment.
 """
 
 from __future__ import annotations

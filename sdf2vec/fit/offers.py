@@ -10,6 +10,7 @@ import math
 from collections import defaultdict
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import Any
 
 import torch
@@ -131,8 +132,13 @@ class Offer:
     @property
     def place(self) -> Place:
         """Its place in the draw order, its colour, and the part of its region."""
+        return (*self.purpose, self.part)
+
+    @cached_property
+    def purpose(self) -> tuple[int, Color]:
+        """Its place in the draw order, and the colour that it is for."""
         red, green, blue = self.region.opening.color[0].tolist()
-        return self.order, (red, green, blue), self.part
+        return self.order, (red, green, blue)
 
     @property
     def kind(self) -> str:
@@ -252,14 +258,14 @@ def _tries(found: Sequence[Offer]) -> list[list[Offer]]:
     for offer in found:
         if len(seeds) == MOST or offer.gain < WEAKEST * found[0].gain:
             break
-        rivals = (seed for seed in seeds if seed.place[:2] == offer.place[:2])
+        rivals = (seed for seed in seeds if seed.purpose == offer.purpose)
         if all(_overlap(offer.cover, seed.cover) < APART for seed in rivals):
             seeds.append(offer)
     groups = []
     for seed in seeds:
         kinds: dict[str, list[Offer]] = defaultdict(list)
         for offer in found:
-            if offer.place[:2] == seed.place[:2] and _likeness(offer.cover, seed.cover) > ALIKE:
+            if offer.purpose == seed.purpose and _likeness(offer.cover, seed.cover) > ALIKE:
                 kinds[offer.kind].append(offer)
         groups.append([offer for own in kinds.values() for offer in own[:EACH]])
     return groups

@@ -15,7 +15,6 @@ from functools import partial
 import torch
 
 from ..paints import BASE
-from ..render import fused
 from ..render.tensors import SceneTensors
 from .adam import adam_over
 from .constraints import enforce_min_thickness, project
@@ -23,7 +22,7 @@ from .joining import Search, detached, faults_of, inserted
 from .offers import NEAR, Offer, instead_of, offers
 from .presets import Phase
 from .ramps import lowest
-from .surroundings import Surroundings, View, layer_at, some
+from .surroundings import Surroundings, View, layer_at, residual_of, some
 
 FLOOR = 10**-4.4  # mean squared error, 44 dB: below it nothing is missing
 FEW = 24  # layers that are descended one by one, too
@@ -90,9 +89,7 @@ def error_of(scene: SceneTensors, view: View) -> float:
 
 
 def _wrong(scene: SceneTensors, view: View) -> torch.Tensor:
-    channels, height, width = view.target.shape
-    wrong = fused.composite(scene, width, height, channels) - view.target
-    return (wrong if view.weights is None else wrong * view.weights).square().mean()
+    return residual_of(scene, view).square().mean()
 
 
 def _offers(scene: SceneTensors, view: View, search: Search, floor: float, greedy: bool) -> list[Offer]:

@@ -11,6 +11,7 @@ from typing import NamedTuple
 import torch
 
 from ..layer import ROW_OPACITY, Structure
+from ..render import fused
 from ..render.reference import canvas, composite_points, lay, rows_coverage
 from ..render.tensors import Group, SceneTensors
 from .laying import Laid
@@ -32,6 +33,13 @@ def points_of(scene: SceneTensors, view: View) -> Points:
     """The pixel centres of a picture on the scene's canvas."""
     x, y, pixel = canvas(scene, view.target.shape[2], view.target.shape[1])
     return x, y, pixel
+
+
+def residual_of(scene: SceneTensors, view: View) -> torch.Tensor:
+    """How far a scene is from a picture, weighted, [C, H, W]; differentiable."""
+    channels, height, width = view.target.shape
+    wrong = fused.composite(scene, width, height, channels) - view.target
+    return wrong if view.weights is None else wrong * view.weights
 
 
 def some(scene: SceneTensors, which: Callable[[torch.Tensor], torch.Tensor]) -> SceneTensors:
@@ -90,7 +98,7 @@ class Surroundings:
         if len(structure) > MOST_COMPILED:
             weights = 1.0 if counts is None else counts[:, None]
             return Dense(lambda rows: self._wrong_at(structure, rows) * weights, len(self.weights))
-        weights = self.weights * (torch.ones(1, len(self.weights)) if counts is None else counts)
+        weights = self.weights[None] if counts is None else self.weights * counts
         channels = len(self.target)
         scale = (self.light - self.dark)[:channels] * weights[:, None]
         offset = (self.target.flatten(1) - self.dark[:channels]) * weights[:, None]
