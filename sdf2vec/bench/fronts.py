@@ -15,6 +15,7 @@ from .pareto import Point, front
 from .results import Run
 
 COLUMNS = 3
+WIDE = 100.0  # times the least cost: of a panel that reaches farther, only 1, 10, 100, … have labels
 COLORS = {"ours": "#0b61a4", "variant": "#57a0d3", "thesis": "#d1495b", "peer": "#e0a030"}
 SIGNS = {"ours": "o", "variant": ".", "thesis": "s", "peer": "^"}
 ABOUT = {
@@ -95,11 +96,17 @@ def drawn(runs: Sequence[Run], across: Across, up: str) -> Figure:
     return figure
 
 
+def _labelled(costs: Sequence[float]) -> tuple[float, ...]:
+    """Which numbers of a decade have a label, so that labels have room."""
+    wide = min(costs, default=1.0) * WIDE < max(costs, default=1.0)
+    return (1.0,) if wide else (1.0, 2.0, 5.0)
+
+
 def _fill(panel: Axes, found: Sequence[Point], up: str) -> None:
     """All points, and the front with names."""
     panel.set_xscale("log")
-    panel.xaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
-    panel.xaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:,g}"))
+    panel.xaxis.set_major_locator(LogLocator(subs=_labelled([point.cost for point in found])))
+    panel.xaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:,.7g}"))
     panel.xaxis.set_minor_formatter(NullFormatter())
     panel.grid(alpha=0.25, which="both")
     for family in COLORS:
