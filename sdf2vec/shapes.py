@@ -90,7 +90,8 @@ class Kind:
     contour at `distance = offset`, where it has a simple form. `area(*parameters)` is what it covers when sharp,
     and `thickness(*parameters)` its least width; both may be those of a simpler shape near it. `frame(*parameters)`
     is what it is painted in, the box around it unless told. A `patch` has coverage of its own; the distance then
-    only says where it is, and it can't be joined with others.
+    only says where it is, and it can't be joined with others. A number `at_most` the least of another changes nothing
+    beyond it.
     """
 
     name: str
@@ -104,6 +105,7 @@ class Kind:
     slope: Callable[..., Expr] = lambda *parameters: const(1.0)
     own_frame: Callable[..., Frame] | None = None
     patch: Patch | None = None
+    at_most: tuple[tuple[str, str], ...] = ()
 
     def frame(self, *parameters: Expr) -> Frame:
         """What the shape is painted in."""
@@ -430,6 +432,7 @@ KINDS: dict[str, Kind] = {
             _box_thickness,
             exact=True,
             outline=_box_outline,
+            at_most=(("corner_radius", "half_size"),),
             own_frame=_turned_frame,
         ),
         Kind(

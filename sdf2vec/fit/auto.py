@@ -25,7 +25,7 @@ from .backends import CPU, choose
 from .byte_budget import SLOPE, Share, within
 from .description import description_length
 from .digits import concise, fit_concisely
-from .initialization import Layers, background_of, empty_groups
+from .initialization import FAINTEST_GROUND, Layers, background_of, empty_groups
 from .joining import Search
 from .loop import Callback, Progress, Stopped
 from .matching_pursuit import Painted, find_discs
@@ -33,7 +33,7 @@ from .offers import common_color
 from .one_more import gain_of_one_more
 from .ramps import grounded
 from .settings import AUTO, Settings, preset_of
-from .simplify import simplified
+from .simplify import sharing, simplified
 from .sparse import FLOOR, Round, Sizes, error_of, finished, grow, needed, pruned
 from .surroundings import View
 from .views import scaled, view_of
@@ -255,11 +255,12 @@ class Drawing:
         return to_scene(self.scene, self.picture.width, self.picture.height)
 
     def _finish(self) -> None:
-        self.scene = finished(self.scene, self.sizes, self.search)
         worst = 0.0 if self.settings.target_psnr is None else self.floor
         if worst:
             self.scene = pruned(self.scene, self.sizes, self.search, worst)
         self.scene = simplified(self.scene, self.sizes.joint, self.search, worst)
+        self.scene = finished(self.scene, self.sizes, self.search)
+        self.scene = sharing(self.scene, self.sizes.last, worst)
 
     def _is_no_drawing(self, made: Round) -> bool:
         """Whether far more shapes would be needed than there may be."""
@@ -289,9 +290,9 @@ class Drawing:
 
 
 def ground_of(target: torch.Tensor) -> torch.Tensor:
-    """The most common colour of a picture [C, H, W] where it dominates, else the mean."""
+    """The most common colour of a picture [C, H, W] where it dominates, else the mean; none where it has holes."""
     if len(target) == 4:
-        return background_of(target)
+        return background_of(target) if float(target[3].min()) >= FAINTEST_GROUND else torch.zeros(4)
     colors = target.flatten(1).T
     common = common_color(colors, torch.ones(len(colors)))
     near = (colors - common).abs().amax(1) < LEVELS

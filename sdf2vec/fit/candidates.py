@@ -15,7 +15,7 @@ from typing import Any, NamedTuple
 
 import torch
 
-from ..blend import JOINS, SHARPEST
+from ..blend import JOINS, SHARPEST, SUBTRACTION
 from ..deferred import deferred
 from ..expr import const, var, vec3, vec4
 from ..layer import JOIN, LOOK, Part, Slot, Structure, slots
@@ -123,6 +123,11 @@ def openings(layer: Group, around: Surroundings) -> Iterator[Opening]:
         yield _opening(without(layer, index), index, part.join, color, around)
 
 
+def cut_from(layer: Group, around: Surroundings) -> Opening:
+    """Where a shape can be cut out of a layer as it is."""
+    return _opening(layer, len(layer.structure), SUBTRACTION, layer.of(BASE.name, 0), around)
+
+
 def reductions(layer: Group) -> Iterator[Group]:
     """A layer without each of its parts, where another is left to begin with."""
     for index in range(len(layer.structure)):
@@ -221,7 +226,7 @@ class Proposer:
 
     def candidates(self, places: Sequence[Opening], around: Surroundings) -> list[list[Tried]]:
         """For each opening a layer with the best shape of every kind in it; errors are estimates."""
-        starts = [self._placed(place.mask.gain, around) for place in places]
+        starts = [self.placed(place.mask.gain, around) for place in places]
         used = [index for index, placed in enumerate(starts) if len(placed.sizes)]
         found: list[list[Tried]] = [[] for _ in places]
         for kind in self.kinds if used else ():
@@ -236,15 +241,11 @@ class Proposer:
         self,
         kind: str,
         places: Sequence[Opening],
-        wanted: Sequence[torch.Tensor],
+        starts: Sequence[Placed],
         around: Surroundings,
         kept: int,
     ) -> list[tuple[int, Group]]:
-        """All that shapes of a kind come to, with the opening that each is for, which has so many.
-
-        They start where most is `wanted` [P] of each opening.
-        """
-        starts = [self._placed(gain, around) for gain in wanted]
+        """All that shapes of a kind come to from each opening's starts, with the opening, which has so many."""
         used = [index for index, start in enumerate(starts) if len(start.sizes)]
         if not used:
             return []
@@ -290,8 +291,8 @@ class Proposer:
             rows, errors = descend(rows, _misses(structure, spread, around, blur), numbers, STEPS, self.tick)
         return rows, errors, counts
 
-    def _placed(self, gain: torch.Tensor, around: Surroundings) -> Placed:
-        """The regions of what is wanted: along each, the other way round, and turned at random without stretching."""
+    def placed(self, gain: torch.Tensor, around: Surroundings) -> Placed:
+        """Where shapes start: along each region of what is wanted [P], the other way round, and turned at random."""
         height, width = around.shape
         found = torch.tensor(ellipses_of(gain.reshape(height, width).numpy())).reshape(-1, 5)
         size = torch.tensor(around.scene.size)

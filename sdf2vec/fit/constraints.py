@@ -14,6 +14,7 @@ from ..render.tensors import Group, SceneTensors
 from ..shapes import KINDS
 from ..units import BACKGROUND, LONGEST, Room
 
+ALMOST = 0.999
 NEWTON_STEPS = 6  # towards the least thickness, at most
 FLAT = 0.1  # squared derivative of a thickness, which is 1 and more unless the shape is next to a point
 GOLDEN = 2.39996  # radians; multiples of it never meet
@@ -26,6 +27,9 @@ def project(tensors: SceneTensors, pixel: float, falloff: tuple[float, float] = 
     for group in tensors.groups:
         for slot, values in group.values.items():
             slot.parameter.unit.project(values, slot.parameter.positive, room)
+        for index, part in enumerate(group.structure):
+            for name, other in KINDS[part.kind].at_most:  # where it changes nothing, nothing would move it
+                group.of(name, index).clamp_(max=ALMOST * group.of(other, index).amin(1, keepdim=True))
     BACKGROUND.project(tensors.background, False, room)
     tensors.background.clamp_(max=tensors.background[3].clone())  # premultiplied
 

@@ -20,7 +20,7 @@ from ..render.tensors import Group, SceneTensors
 from ..shapes import KINDS
 from ..units import FALLOFF, SMOOTHNESS
 from .adam import rate_of
-from .candidates import Proposer, Tried, alone, openings, reductions
+from .candidates import Opening, Proposer, Tried, alone, openings, reductions
 from .constraints import project
 from .initialization import Layers, straight
 from .levenberg import Numbers, descend
@@ -34,6 +34,7 @@ FINALISTS, TRAINED, BEAM = (
     3,
 )  # changes of a layer that are screened; that are trained; that are built on
 KINDS_EACH = 2  # finalists of other kinds of shape in the same place
+LIKELY = 2  # kinds of shape in an opening, of one change
 ALIKE = 0.1  # squared difference of two layers that look the same, in shares of the error
 REFINED, REFINING = 2, 20  # layers that are refined at the end; steps at each resolution
 MOST_JOINED = 24  # shapes in one layer
@@ -240,6 +241,16 @@ class Search:
         kinds = (kind for own in found for kind in worth.best(own)[:KINDS_EACH])
         fewer = (Tried(less, around.error(less)) for less in reductions(tried.layer))
         return [*worth.best(kinds)[:FINALISTS], *worth.best(fewer)[:1]]
+
+    def filled(self, place: Opening, around: Surroundings) -> Tried | None:
+        """The layer with the best shape in an opening, where anything is wanted there."""
+        tried = (self.refined(likely.layer, around) for likely in self.likely(place, around))
+        return min(tried, key=lambda found: found.error, default=None)
+
+    def likely(self, place: Opening, around: Surroundings) -> list[Tried]:
+        """The layer with a shape of each of the likeliest kinds in an opening; none where nothing is wanted."""
+        (found,) = self.proposer(around).candidates([place], around)
+        return sorted(found, key=lambda tried: tried.error)[:LIKELY]
 
     def proposer(self, around: Surroundings) -> Proposer:
         """What fits single shapes to masks."""

@@ -16,7 +16,7 @@ from ..kernel_cache import Assembly, Entry
 from ..layer import Formula, Structure
 from ..lower.block import Block
 from ..lower.llvm import assembled, forward
-from ..render.kernels import drawn
+from ..render.kernels import carried, drawn
 from ..render.tiling import PIXELS
 from ..threads import in_threads, threads
 from .normal_kernels import add_products, sum_squares
@@ -25,11 +25,16 @@ from .normal_kernels import add_products, sum_squares
 @cache
 def entries(structure: Structure, compositing: str, channels: int) -> tuple[Entry, Entry]:
     """What a layer makes of what is below it: a row a channel. The same, followed by the derivatives of the first
-    channel by each of the layer's numbers, then those of the second, ….
+    channel by each of the layer's numbers, then those of the second, …; last, of each by what is below in it.
     """
     block = drawn(Formula.of(structure), "laid", compositing, channels)
     slopes = [slope for output in block.outputs for slope in gradient(output, block.uniforms[1:])]
-    sloped = replace(block, name="sloped", outputs=(*block.outputs, *slopes))
+    through = [
+        slope
+        for output, below in zip(block.outputs, carried(channels), strict=True)
+        for slope in gradient(output, [below])
+    ]
+    sloped = replace(block, name="sloped", outputs=(*block.outputs, *slopes, *through))
     assembly = Assembly(assembled([_text(each, channels) for each in (block, sloped)]))
     return assembly["laid"], assembly["sloped"]
 
@@ -62,7 +67,7 @@ class Laid:
         """The normal equations by the free numbers."""
         count, width = rows.shape
         normal, right = np.zeros((count, len(free), len(free))), np.zeros((count, len(free)))
-        values = len(self.below) * (1 + width)
+        values = len(self.below) * (2 + width)
         self._run(add_products, 1, values, rows, free.numpy(), normal, right)
         normal += np.tril(normal, -1).transpose(0, 2, 1)
         return torch.from_numpy(normal).to(rows.dtype), torch.from_numpy(right).to(rows.dtype)

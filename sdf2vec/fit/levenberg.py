@@ -68,17 +68,19 @@ def descend(
     A step that does not help is not made; it ends early where `PATIENCE` steps have hardly helped any candidate. `tick`
     is told the least of the errors after every step.
     """
-    idle = 0
+    idle, equations = 0, None
     damping = rows.new_full((len(rows),), FIRST_DAMPING)
     errors = problem.errors(rows)
     for _ in range(steps):
         moved = rows.clone()
-        step = _step(rows, problem, numbers.free, damping)
+        equations = equations or problem.normal(rows, numbers.free)
+        step = _step(*equations, damping)
         moved[:, numbers.free] -= step.clamp(-numbers.longest, numbers.longest)
         numbers.project(moved)
         found = problem.errors(moved)
         better = found < errors
         idle = 0 if bool((found < errors * (1.0 - HARDLY)).any()) else idle + 1
+        equations = None if bool(better.any()) else equations
         rows = torch.where(better[:, None], moved, rows)
         errors = torch.where(better, found, errors)
         damping = (damping * torch.where(better, LESS, MORE)).clamp(LEAST_DAMPED, MOST_DAMPED)
@@ -88,10 +90,9 @@ def descend(
     return rows, errors
 
 
-def _step(rows: torch.Tensor, problem: Problem, free: torch.Tensor, damping: torch.Tensor) -> torch.Tensor:
+def _step(normal: torch.Tensor, right: torch.Tensor, damping: torch.Tensor) -> torch.Tensor:
     """How far the free numbers are too large by the damped normal equations, [G, F]."""
-    normal, right = problem.normal(rows, free)
     scale = normal.diagonal(dim1=1, dim2=2)
-    normal = normal + torch.diag_embed(scale * damping[:, None] + TINY)
-    step: torch.Tensor = torch.linalg.solve(normal, right)
+    damped = normal + torch.diag_embed(scale * damping[:, None] + TINY)
+    step: torch.Tensor = torch.linalg.solve(damped, right)
     return step

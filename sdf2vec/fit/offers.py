@@ -16,13 +16,12 @@ from typing import Any
 import torch
 from torch.nn.functional import max_pool2d
 
-from ..blend import SUBTRACTION
 from ..deferred import deferred
 from ..layer import row_width
 from ..render.reference import rows_coverage
 from ..render.tensors import Group
 from ..scene import Color
-from .candidates import Opening, alone, openings
+from .candidates import Opening, alone, cut_from
 from .initialization import straight
 from .joining import Search, layer_of
 from .levenberg import descend
@@ -48,10 +47,11 @@ ROUGH, NEARLY_CLEAN, CLEAN = (
     0.06,
 )  # what is left of a region, at most, by a shape that may explain it; that does
 PRICE = 0.02  # of a number, in logarithms of what is left
-CUT, CUT_KINDS = 4, 2  # shapes from which others are cut; kinds of these
+CUT = 4  # shapes from which others are cut
 LEAST_GAIN = 0.02  # of what is missing, by a shape that is worth its numbers
 CUTTABLE = 0.3  # how much harm matters where it may be cut away
 WEAK = 0.2  # of the greatest gain: what is clean and gains less waits
+SINGLY = 3  # of the best offers that are tried alone
 BLAME = 2.0  # for what is left, where clean shapes are rivals
 WORTH, HOPELESS = 0.05, 1.5  # least share of all that is missing, most that is left, where shapes are cut
 
@@ -146,15 +146,18 @@ class Offer:
         return self.layer.structure[0].kind
 
     @property
+    def is_joined(self) -> bool:
+        """Whether its layer has several shapes."""
+        return len(self.layer.structure) > 1
+
+    @property
     def order(self) -> int:
         """Its place in the draw order."""
         return int(self.layer.order)
 
 
-def offers(
-    around: Mapping[int, Surroundings], search: Search, floor: float, greedy: bool = False
-) -> list[Offer]:
-    """Shapes that hardly overlap, each the best for its region; else, or where `greedy`, the one that gains most.
+def offers(around: Mapping[int, Surroundings], search: Search, floor: float) -> list[Offer]:
+    """The best shape for each region that is worth its numbers, the best first.
 
     `around`: the scene as it is seen from places of the draw order. `floor`: mean squared error that need not be
     explained.
@@ -162,10 +165,20 @@ def offers(
     colors = {order: missing_colors(place) for order, place in around.items()}
     least = LEAST_GAIN * _missing(around)
     best = [offer for offer in _found(around, colors, search, floor) if offer.gain > least]
-    best.sort(key=lambda offer: offer.gain * (BLAME * offer.left - 1.0))
+    return sorted(best, key=lambda offer: offer.gain * (BLAME * offer.left - 1.0))
+
+
+def choices(best: Sequence[Offer]) -> Iterator[list[Offer]]:
+    """What of the best offers may be taken at once: those that explain regions and hardly overlap; one of the best.
+
+    What has a hole waits for plain shapes: these may hide what the hole is for.
+    """
     most = max((offer.gain for offer in best), default=0.0)
-    clean = [offer for offer in best if offer.left < CLEAN and offer.gain > WEAK * most]
-    return _apart(clean) if clean and not greedy else best[:1]
+    clean = _apart([offer for offer in best if offer.left < CLEAN and offer.gain > WEAK * most])
+    clean = [offer for offer in clean if not offer.is_joined] or clean
+    if clean:
+        yield clean
+    yield from ([offer] for offer in best[:SINGLY] if clean != [offer])
 
 
 def instead_of(
@@ -219,10 +232,11 @@ def _searched(
     for color in colors:
         near, eager = (Region.of(o, around) for o in alone(here, color, search.falloff[0], around))
         regions += [near, eager, *near.split()]
-    openings, wanted = [region.opening for region in regions], [region.wanted for region in regions]
+    openings = [region.opening for region in regions]
     proposer = search.proposer(around)
+    starts = [proposer.placed(region.wanted, around) for region in regions]
     for kind in proposer.kinds if openings else ():
-        ends = proposer.optima(kind, openings, wanted, around, STARTS)
+        ends = proposer.optima(kind, openings, starts, around, STARTS)
         if ends:
             rows = torch.cat([layer.rows() for _, layer in ends])
             made = _offers_of(rows, ends[0][1], [regions[index] for index, _ in ends], around)
@@ -302,11 +316,9 @@ def _unfit(every: Sequence[Offer], best: Sequence[Offer], around: Mapping[int, S
 def _cut(base: Offer, around: Mapping[int, Surroundings], search: Search) -> list[Offer]:
     """A layer with a shape cut out of it, of the likeliest kinds."""
     place, region = around[base.order], base.region
-    mask = next(opening for opening in openings(base.layer, place) if opening.join == SUBTRACTION)
-    opening = replace(mask, mask=mask.mask.only(region.counts))
-    (found,) = search.proposer(place).candidates([opening], place)
-    likely = sorted(found, key=lambda tried: tried.error)[:CUT_KINDS]
-    made = [_descended([tried.layer], [region], place, search)[0] for tried in likely]
+    opening = cut_from(base.layer, place)
+    opening = replace(opening, mask=opening.mask.only(region.counts))
+    made = [_descended([tried.layer], [region], place, search)[0] for tried in search.likely(opening, place)]
     return [offer for offer in made if offer is not None]
 
 

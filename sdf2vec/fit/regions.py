@@ -7,10 +7,13 @@ from collections.abc import Iterator
 from itertools import combinations
 
 import numpy as np
+from scipy import ndimage
 from skimage import measure
 
 LEAST = 0.2  # of the greatest gain: what belongs to a region
 MOST_REGIONS, MOST_PAIRS = 5, 4  # regions; of which pairs are made
+MOST_BRANCHED, MOST_STROKES = 2, 5  # regions whose strokes are looked for; strokes of each
+LEAST_STROKE, MOST_STROKE = 0.05, 0.9  # share of the region
 SMALLEST = 0.02  # share of all gain that a region has at least
 THINNEST = 0.5  # pixels: half an ellipse's shorter axis
 
@@ -20,7 +23,7 @@ Ellipse = tuple[
 
 
 def ellipses(gain: np.ndarray) -> list[Ellipse]:
-    """Of the regions of a gain [H, W] that have most of it: all together, each, and pairs; no longer than they are."""
+    """Of the regions of a gain [H, W] that have most of it: all together, each, their strokes, pairs; no longer."""
     return [_ellipse(region) for region in _regions(gain)]
 
 
@@ -39,7 +42,34 @@ def _regions(gain: np.ndarray) -> Iterator[np.ndarray]:
     if len(found) > 2:
         yield labels > 0
     yield from found
+    for region in found[:MOST_BRANCHED]:
+        yield from strokes(region)
     yield from (one | other for one, other in combinations(found[:MOST_PAIRS], 2))
+
+
+def strokes(region: np.ndarray) -> list[np.ndarray]:
+    """The straight strokes of a region [H, W] that is longer than thick, as masks, the largest first; none of others.
+
+    They are what a line twice as long as the region is thick fits into, in one of four directions.
+    """
+    padded = np.pad(region, 1)
+    reach = math.ceil(2.0 * ndimage.distance_transform_edt(padded).max())
+    found = []
+    for line in _lines(reach):
+        if max(line.shape) > max(region.shape):
+            return []
+        labels = measure.label(ndimage.binary_opening(region, line))
+        found += [labels == number for number in range(1, labels.max() + 1)]
+    least = LEAST_STROKE * region.sum()
+    found = [stroke for stroke in found if least < stroke.sum() < MOST_STROKE * region.sum()]
+    return sorted(found, key=lambda stroke: -stroke.sum())[:MOST_STROKES]
+
+
+def _lines(reach: int) -> list[np.ndarray]:
+    """Masks of lines through a middle that go so many pixels to both sides."""
+    size = 2 * reach + 1
+    diagonal = np.eye(size, dtype=bool)
+    return [np.ones((1, size), bool), np.ones((size, 1), bool), diagonal, diagonal[::-1]]
 
 
 def _ellipse(region: np.ndarray) -> Ellipse:

@@ -39,19 +39,25 @@ Propose = Callable[[Group, View], Iterator[Change]]
 
 def simplified(scene: SceneTensors, view: View, search: Search, worst: float) -> SceneTensors:
     """The scene with simpler layers, while its mean squared error hardly rises or stays below the worst."""
-    error = error_of(scene, view)
-    trial = Trial(view, search, max(worst, RISE * error, error + UNSEEN))
+    trial = Trial(view, search, _limit(scene, view, worst))
     for order in range(scene.layer_count):
         kept: tuple[Slot, ...] = ()
         for change in CHANGES:
             while (made := trial.changed(scene, order, change, kept)) is not None:
                 scene, still = made
                 kept = (*kept, *still)
-    return _sharing(scene, trial)
+    return scene
 
 
-def _sharing(scene: SceneTensors, trial: Trial) -> SceneTensors:
+def _limit(scene: SceneTensors, view: View, worst: float) -> float:
+    """Up to which mean squared error a change is kept."""
+    error = error_of(scene, view)
+    return max(worst, RISE * error, error + UNSEEN)
+
+
+def sharing(scene: SceneTensors, view: View, worst: float) -> SceneTensors:
     """The scene with colours that are close to one of a layer below made the same, while it stays good enough."""
+    limit = _limit(scene, view, worst)
     shared: list[torch.Tensor] = []
     for order in range(scene.layer_count):
         layer = layer_at(scene, order)
@@ -62,7 +68,7 @@ def _sharing(scene: SceneTensors, trial: Trial) -> SceneTensors:
         )
         if close and layer.structure[0].paint == FLAT:
             recolored = inserted(scene, _with_color(layer, close[0]))
-            if error_of(recolored, trial.view) <= trial.limit:
+            if error_of(recolored, view) <= limit:
                 scene = recolored
                 continue
         shared.append(own)

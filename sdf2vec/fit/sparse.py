@@ -17,15 +17,19 @@ import torch
 from ..paints import BASE
 from ..render.tensors import SceneTensors
 from .adam import adam_over
+from .candidates import Opening, cut_from
 from .constraints import enforce_min_thickness, project
 from .joining import Search, detached, faults_of, inserted
-from .offers import NEAR, Offer, instead_of, offers
+from .least_squares import count_numbers, improved
+from .offers import NEAR, Offer, choices, instead_of, offers
 from .presets import Phase
 from .ramps import lowest
 from .surroundings import Surroundings, View, layer_at, residual_of, some
 
 FLOOR = 10**-4.4  # mean squared error, 44 dB: below it nothing is missing
 FEW = 24  # layers that are descended one by one, too
+MOST_AT_ONCE = 1200  # numbers of layers whose least squares are solved
+WORTH = 6  # steps of Adam, of one by least squares
 EACH = 8  # steps of such a descent
 JOINT = Phase("joint", 60, 0, rate=0.3, end_rate=0.02)
 AFTER = Phase("after", 40, 0, rate=0.2, end_rate=0.02)  # one layer was taken out
@@ -33,6 +37,7 @@ LAST = Phase("last", 150, 0, rate=0.3, end_rate=0.01)
 MOVED = 0.98  # of the error, at most, after a layer was moved in the draw order
 HELPS = 0.92  # of the error before, at most, of a round that is kept
 NEEDLESS, HOPEFUL = 1.05, 6.0  # how much the error may rise by a layer taken out: after a descent; before it
+THROUGH = 0.1  # of the error that a cut could take away where the picture is transparent, at least, for a try
 RETHOUGHT = 2  # colours whose layers are found anew in a round, at most
 TRIED = 2  # layers that matter least, of which one may be taken out
 
@@ -61,12 +66,7 @@ def grow(
     """The scene after each round, until it has as many layers as `most`, is near enough, or is helped no more."""
     error = error_of(scene, sizes.joint)
     while scene.layer_count < most and error > floor:
-        for greedy in (False, True):
-            found = _offers(scene, sizes.search, search, floor, greedy)[: most - scene.layer_count]
-            if not found:
-                return
-            made = _descended(_with(scene, found), sizes, search)
-            made = _rethought(pruned(made, sizes, search, floor), sizes, search, floor)
+        for made in _alternatives(scene, sizes, search, most, floor):
             now = error_of(made, sizes.joint)
             if now <= HELPS * error or made.layer_count < scene.layer_count:
                 break
@@ -76,9 +76,19 @@ def grow(
         scene, error = made, now
 
 
+def _alternatives(
+    scene: SceneTensors, sizes: Sizes, search: Search, most: int, floor: float
+) -> Iterator[SceneTensors]:
+    """What a round may come to: with shapes that explain regions, with the one that gains most, with holes."""
+    for found in choices(_offers(scene, sizes.search, search, floor)):
+        made = _descended(_with(scene, found[: most - scene.layer_count]), sizes, search)
+        yield _rethought(pruned(made, sizes, search, floor), sizes, search, floor)
+    yield _carved(scene, sizes, search, floor)
+
+
 def finished(scene: SceneTensors, sizes: Sizes, search: Search) -> SceneTensors:
-    """The scene after a last descent at the largest size."""
-    made = descended(scene, sizes.last, search, LAST)
+    """The scene after a last descent at the largest size; what is simple stays so."""
+    made = descended(scene, sizes.last, search, LAST, simple=True)
     return min(scene, made, key=partial(error_of, view=sizes.last))
 
 
@@ -92,11 +102,15 @@ def _wrong(scene: SceneTensors, view: View) -> torch.Tensor:
     return residual_of(scene, view).square().mean()
 
 
-def _offers(scene: SceneTensors, view: View, search: Search, floor: float, greedy: bool) -> list[Offer]:
-    """New layers, for the top of the scene or its bottom; the draw order is that of the scene without the others."""
-    orders = sorted({lowest(scene), scene.layer_count})
+def _offers(scene: SceneTensors, view: View, search: Search, floor: float) -> list[Offer]:
+    """New layers, for the bottom of the scene, its top, or next above the layer where most is wrong; the draw order is
+    that of the scene without the others.
+    """
+    faults = faults_of(scene, view) if scene.groups else [0.0]
+    above = max(range(len(faults)), key=faults.__getitem__) + 1
+    orders = sorted({lowest(scene), min(above, scene.layer_count), scene.layer_count})
     around = {order: Surroundings.of(_opened(scene, order), order, view) for order in orders}
-    return offers(around, search, floor, greedy)
+    return offers(around, search, floor)
 
 
 def _opened(scene: SceneTensors, order: int) -> SceneTensors:
@@ -107,9 +121,8 @@ def _opened(scene: SceneTensors, order: int) -> SceneTensors:
 
 def _with(scene: SceneTensors, found: list[Offer]) -> SceneTensors:
     """The scene with new layers."""
-    for offer in found:
-        order = scene.layer_count if offer.order > lowest(scene) else lowest(scene)
-        scene = inserted(_opened(scene, order), replace(offer.layer, order=torch.tensor([order])))
+    for offer in sorted(found, key=lambda offer: -offer.order):
+        scene = inserted(_opened(scene, offer.order), offer.layer)
     return scene
 
 
@@ -184,6 +197,33 @@ def _rethought(scene: SceneTensors, sizes: Sizes, search: Search, floor: float) 
     return scene
 
 
+def _carved(scene: SceneTensors, sizes: Sizes, search: Search, floor: float) -> SceneTensors:
+    """The scene with shapes cut out of its layers, one after the other, while that helps: nothing can be laid on a
+    layer where the picture is transparent.
+    """
+    error = error_of(scene, sizes.joint)
+    while 0 < scene.layer_count <= FEW and error > floor:
+        places = [Surroundings.of(scene, order, sizes.search) for order in range(scene.layer_count)]
+        cuts = [cut_from(layer_at(scene, order), around) for order, around in enumerate(places)]
+        gains = [_seen_through(*pair) for pair in zip(cuts, places, strict=True)]
+        best = max(range(len(gains)), key=gains.__getitem__)
+        cut = search.filled(cuts[best], places[best]) if gains[best] >= THROUGH * error else None
+        if cut is None:
+            return scene
+        made = descended(inserted(scene, cut.layer), sizes.joint, search, AFTER)
+        now = error_of(made, sizes.joint)
+        if now > HELPS * error:
+            return scene
+        scene, error = made, now
+    return scene
+
+
+def _seen_through(cut: Opening, around: Surroundings) -> float:
+    """By how much the mean squared error may fall where a layer is cut out and the picture is transparent."""
+    channels = around.target.flatten(1)
+    return float((cut.mask.best_gain * (1.0 - channels[3])).mean()) if len(channels) == 4 else 0.0
+
+
 def _alike(scene: SceneTensors, view: View) -> list[list[int]]:
     """Places in the draw order of layers of about one colour, those first where most is wrong."""
     faults = faults_of(scene, view)
@@ -198,12 +238,17 @@ def _alike(scene: SceneTensors, view: View) -> list[list[int]]:
     return sorted((orders for _, orders in found), key=lambda orders: -sum(faults[order] for order in orders))
 
 
-def descended(scene: SceneTensors, view: View, search: Search, phase: Phase) -> SceneTensors:
-    """A copy of the scene after a phase of steps down the squared error, all numbers together."""
+def descended(
+    scene: SceneTensors, view: View, search: Search, phase: Phase, simple: bool = False
+) -> SceneTensors:
+    """A copy of the scene after a phase of steps down the squared error, all numbers together; `simple` ones stay.
+
+    By least squares where the numbers are few enough, of which a step is worth many of Adam's.
+    """
+    if count_numbers(scene) <= MOST_AT_ONCE:
+        return improved(scene, view, search, phase.steps // WORTH, simple)
     scene = detached(scene)
     optimizer = adam_over(scene)
-    if not optimizer.moving:  # nothing on nothing
-        return scene
     with torch.enable_grad():
         for rate in phase.rates():
             optimizer.zero_grad()
@@ -234,12 +279,11 @@ def _fewer(
     scene: SceneTensors, sizes: Sizes, search: Search, worst: float
 ) -> tuple[SceneTensors, float] | None:
     """The scene without one of the layers that matter least, and its error, if that is at most the worst."""
-    tried = [without(scene, order) for order in range(scene.layer_count)]
-    ranked = sorted((error_of(fewer, sizes.joint), i) for i, fewer in enumerate(tried))[:TRIED]
-    for error, index in ranked:
-        fewer = tried[index]
-        if error > HOPEFUL * worst:
-            return None
+    rest = [without(scene, order) for order in range(scene.layer_count)]
+    tried = [(error_of(fewer, sizes.joint), fewer) for fewer in rest]
+    least = sorted(tried, key=lambda pair: pair[0])[:TRIED]
+    hopeful = [pair for pair in least if pair[0] <= HOPEFUL * worst]
+    for error, fewer in sorted(hopeful, key=lambda pair: count_numbers(pair[1])):
         if error > worst and fewer.layer_count:
             if fewer.layer_count <= FEW // 2:
                 fewer = _each_improved(fewer, sizes.search, search)

@@ -17,7 +17,7 @@ from ..render.tensors import Group, SceneTensors
 from .laying import Laid
 from .levenberg import Dense, Problem
 
-MOST_COMPILED = 2  # shapes in a layer: of more there are too many structures to compile kernels for
+MOST_COMPILED = 6  # shapes in a layer: of more there are too many structures to compile kernels for
 
 Points = tuple[torch.Tensor, torch.Tensor, torch.Tensor]  # x [P], y [P], size of a pixel []
 

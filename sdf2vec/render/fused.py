@@ -42,18 +42,19 @@ def _canvas(tensors: SceneTensors, width: int, height: int, channels: int) -> tu
     """What a render needs, and the layers' rows of numbers in draw order."""
     axes = canvas_axes(tensors, -(-width // TILE) * TILE, -(-height // TILE) * TILE, width, height)
     structures = structures_of(tensors)
-    order = _draw_order(tensors)
-    index = np.repeat(np.arange(len(structures)), list(map(len, tensors.groups)))[order.numpy()]
+    _, index, rows = drawn_rows(tensors, float(axes[2]))
     hides = COMPOSITING[tensors.compositing].hides
     draws = [kernels.drawing(structure, tensors.compositing, channels) for structure in structures]
     measures = kernels.addresses([kernels.measuring(structure) for structure in structures])
     canvas = _Canvas(measures, draws, index, channels, width, height, *axes, hides=hides)
-    return canvas, rows_of(tensors.groups, float(axes[2]))[order]
+    return canvas, rows
 
 
-def _draw_order(tensors: SceneTensors) -> torch.Tensor:
-    """For each place in the draw order, where that layer stands when the groups follow each other."""
-    return torch.cat([group.order for group in tensors.groups]).argsort()
+def drawn_rows(tensors: SceneTensors, pixel: float) -> tuple[IntArray, IntArray, torch.Tensor]:
+    """For each place in the draw order, its layer's: place when the groups follow each other, group, row of numbers."""
+    order = torch.cat([group.order for group in tensors.groups]).argsort()
+    groups = np.repeat(np.arange(len(tensors.groups)), list(map(len, tensors.groups)))[order.numpy()]
+    return order.numpy(), groups, rows_of(tensors.groups, pixel)[order]
 
 
 def structures_of(tensors: SceneTensors) -> tuple[Structure, ...]:

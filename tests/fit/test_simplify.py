@@ -9,7 +9,7 @@ from sdf2vec.fit.initialization import Layers
 from sdf2vec.fit.joining import Search
 from sdf2vec.fit.ramps import grounded, lowest
 from sdf2vec.fit.settings import settings_of
-from sdf2vec.fit.simplify import simplified
+from sdf2vec.fit.simplify import sharing, simplified
 from sdf2vec.fit.surroundings import View
 from sdf2vec.image import Picture
 from sdf2vec.quality import quality
@@ -25,7 +25,8 @@ def as_simple_as_drawn(scene, drawn, worst=0.0):
     search = Search(
         Layers(("circle", "box"), "over"), (0.0, 1.0), torch.Generator(), lambda loss: None, 1 / 48
     )
-    return to_scene(simplified(from_scene(scene), view, search, worst), 48, 48)
+    made = simplified(from_scene(scene), view, search, worst)
+    return to_scene(sharing(made, view, worst), 48, 48)
 
 
 def scene(*shapes):
