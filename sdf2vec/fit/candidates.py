@@ -118,9 +118,14 @@ def openings(layer: Group, around: Surroundings) -> Iterator[Opening]:
             next_is_alike = index < len(parts) and parts[index].adds == kind_of_join.adds
             if not next_is_alike:  # else the next place is the same
                 yield _opening(layer, index, join, base, around)
-    for index, part in enumerate(parts):
-        color = layer.of(BASE.name, index) if part.adds else base
-        yield _opening(without(layer, index), index, part.join, color, around)
+    yield from (in_place_of(layer, index, around) for index in range(len(parts)))
+
+
+def in_place_of(layer: Group, index: int, around: Surroundings) -> Opening:
+    """Where another shape can take the place of one of a layer."""
+    part = layer.structure[index]
+    color = layer.of(BASE.name, index if part.adds else 0)
+    return _opening(without(layer, index), index, part.join, color, around)
 
 
 def cut_from(layer: Group, around: Surroundings) -> Opening:

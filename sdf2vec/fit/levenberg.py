@@ -14,6 +14,7 @@ import torch
 FIRST_DAMPING, LESS, MORE = 0.1, 0.3, 5.0  # of a step; after one that helps, after one that does not
 MOST_DAMPED, LEAST_DAMPED = 1e4, 1e-7
 HARDLY, PATIENCE = 1e-3, 6  # share of the error; steps
+FAINT = 1e-4  # of the greatest effect of a number, in squares
 TINY = 1e-9
 
 
@@ -74,7 +75,7 @@ def descend(
     for _ in range(steps):
         moved = rows.clone()
         equations = equations or problem.normal(rows, numbers.free)
-        step = _step(*equations, damping)
+        step = _step(*equations, damping, numbers.longest)
         moved[:, numbers.free] -= step.clamp(-numbers.longest, numbers.longest)
         numbers.project(moved)
         found = problem.errors(moved)
@@ -90,9 +91,17 @@ def descend(
     return rows, errors
 
 
-def _step(normal: torch.Tensor, right: torch.Tensor, damping: torch.Tensor) -> torch.Tensor:
-    """How far the free numbers are too large by the damped normal equations, [G, F]."""
+def _step(
+    normal: torch.Tensor, right: torch.Tensor, damping: torch.Tensor, longest: torch.Tensor
+) -> torch.Tensor:
+    """How far the free numbers are too large by the damped normal equations, [G, F].
+
+    What a longest step of a number does is damped as if it were at least a share of what one of any other does: else
+    a number that does nothing here would be moved far, whatever the damping.
+    """
     scale = normal.diagonal(dim1=1, dim2=2)
+    effect = scale * longest.square()
+    scale = torch.maximum(effect, FAINT * effect.amax(1, keepdim=True)) / longest.square()
     damped = normal + torch.diag_embed(scale * damping[:, None] + TINY)
     step: torch.Tensor = torch.linalg.solve(damped, right)
     return step

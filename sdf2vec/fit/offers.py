@@ -51,7 +51,6 @@ CUT = 4  # shapes from which others are cut
 LEAST_GAIN = 0.02  # of what is missing, by a shape that is worth its numbers
 CUTTABLE = 0.3  # how much harm matters where it may be cut away
 WEAK = 0.2  # of the greatest gain: what is clean and gains less waits
-SINGLY = 3  # of the best offers that are tried alone
 BLAME = 2.0  # for what is left, where clean shapes are rivals
 WORTH, HOPELESS = 0.05, 1.5  # least share of all that is missing, most that is left, where shapes are cut
 
@@ -169,7 +168,7 @@ def offers(around: Mapping[int, Surroundings], search: Search, floor: float) -> 
 
 
 def choices(best: Sequence[Offer]) -> Iterator[list[Offer]]:
-    """What of the best offers may be taken at once: those that explain regions and hardly overlap; one of the best.
+    """What of the best offers may be taken at once: those that explain regions and hardly overlap; the best one.
 
     What has a hole waits for plain shapes: these may hide what the hole is for.
     """
@@ -178,7 +177,8 @@ def choices(best: Sequence[Offer]) -> Iterator[list[Offer]]:
     clean = [offer for offer in clean if not offer.is_joined] or clean
     if clean:
         yield clean
-    yield from ([offer] for offer in best[:SINGLY] if clean != [offer])
+    if best and clean != best[:1]:
+        yield list(best[:1])
 
 
 def instead_of(

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 import operator
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, replace
 from functools import partial
 
@@ -17,7 +17,7 @@ import torch
 from ..paints import BASE
 from ..render.tensors import SceneTensors
 from .adam import adam_over
-from .candidates import Opening, cut_from
+from .candidates import Opening, cut_from, in_place_of
 from .constraints import enforce_min_thickness, project
 from .joining import Search, detached, faults_of, inserted
 from .least_squares import count_numbers, improved
@@ -35,9 +35,11 @@ JOINT = Phase("joint", 60, 0, rate=0.3, end_rate=0.02)
 AFTER = Phase("after", 40, 0, rate=0.2, end_rate=0.02)  # one layer was taken out
 LAST = Phase("last", 150, 0, rate=0.3, end_rate=0.01)
 MOVED = 0.98  # of the error, at most, after a layer was moved in the draw order
-HELPS = 0.92  # of the error before, at most, of a round that is kept
+HELPS = 0.92  # of the error before, at most, after as many rounds as there is patience for
+PATIENCE, CLOSE = 2, 10**-3.9  # rounds; mean squared error, 39 dB, below which there is none for a second
 NEEDLESS, HOPEFUL = 1.05, 6.0  # how much the error may rise by a layer taken out: after a descent; before it
 THROUGH = 0.1  # of the error that a cut could take away where the picture is transparent, at least, for a try
+WORST = 0.1  # of all that is wrong, where a layer is whose shapes are exchanged
 RETHOUGHT = 2  # colours whose layers are found anew in a round, at most
 TRIED = 2  # layers that matter least, of which one may be taken out
 
@@ -63,17 +65,32 @@ class Round:
 def grow(
     scene: SceneTensors, sizes: Sizes, search: Search, most: int, floor: float = FLOOR
 ) -> Iterator[Round]:
-    """The scene after each round, until it has as many layers as `most`, is near enough, or is helped no more."""
-    error = error_of(scene, sizes.joint)
-    while scene.layer_count < most and error > floor:
-        for made in _alternatives(scene, sizes, search, most, floor):
-            now = error_of(made, sizes.joint)
-            if now <= HELPS * error or made.layer_count < scene.layer_count:
-                break
+    """The scene after each round that helped, alone or with those before it, until it has as many layers as `most`, is
+    near enough, or is helped no more.
+    """
+    kept, count, wasted = error_of(scene, sizes.joint), scene.layer_count, 0
+    while scene.layer_count < most and kept > floor and wasted < (PATIENCE if kept > CLOSE else 1):
+        made, now = _better(_alternatives(scene, sizes, search, most, floor), sizes.joint, HELPS * kept)
+        if now <= HELPS * kept or made.layer_count < count:
+            yield Round(made, now, kept)
+            kept, count, wasted = now, made.layer_count, 0
+        elif now < error_of(scene, sizes.joint):
+            wasted += 1
         else:
             return
-        yield Round(made, now, error)
-        scene, error = made, now
+        scene = made
+
+
+def _better(made: Iterable[SceneTensors], view: View, enough: float) -> tuple[SceneTensors, float]:
+    """The first scene whose mean squared error is low enough, or that with the lowest; and the error."""
+    best: tuple[SceneTensors, float] | None = None
+    for scene in made:
+        found = scene, error_of(scene, view)
+        best = found if best is None or found[1] < best[1] else best
+        if best[1] <= enough:
+            break
+    assert best is not None
+    return best
 
 
 def _alternatives(
@@ -83,7 +100,9 @@ def _alternatives(
     for found in choices(_offers(scene, sizes.search, search, floor)):
         made = _descended(_with(scene, found[: most - scene.layer_count]), sizes, search)
         yield _rethought(pruned(made, sizes, search, floor), sizes, search, floor)
-    yield _carved(scene, sizes, search, floor)
+    if scene.layer_count <= FEW:
+        yield _carved(scene, sizes, search, floor)
+        yield _exchanged(scene, sizes, search)
 
 
 def finished(scene: SceneTensors, sizes: Sizes, search: Search) -> SceneTensors:
@@ -202,7 +221,7 @@ def _carved(scene: SceneTensors, sizes: Sizes, search: Search, floor: float) -> 
     layer where the picture is transparent.
     """
     error = error_of(scene, sizes.joint)
-    while 0 < scene.layer_count <= FEW and error > floor:
+    while scene.layer_count and error > floor:
         places = [Surroundings.of(scene, order, sizes.search) for order in range(scene.layer_count)]
         cuts = [cut_from(layer_at(scene, order), around) for order, around in enumerate(places)]
         gains = [_seen_through(*pair) for pair in zip(cuts, places, strict=True)]
@@ -216,6 +235,22 @@ def _carved(scene: SceneTensors, sizes: Sizes, search: Search, floor: float) -> 
             return scene
         scene, error = made, now
     return scene
+
+
+def _exchanged(scene: SceneTensors, sizes: Sizes, search: Search) -> SceneTensors:
+    """The scene with other shapes, of any kind, in the places of those of the worst layers where that helps."""
+    faults = faults_of(scene, sizes.search)
+    worst = [order for order, fault in enumerate(faults) if fault > WORST * sum(faults)]
+    for order in worst:
+        coarse, fine = (Surroundings.of(scene, order, view) for view in (sizes.search, sizes.joint))
+        for index in range(len(layer_at(scene, order).structure)):
+            layer = layer_at(scene, order)
+            likely = search.likely(in_place_of(layer, index, coarse), coarse)
+            tried = [search.refined(other.layer, fine) for other in likely]
+            best = min(tried, key=lambda found: found.error, default=None)
+            if best and best.error < MOVED * fine.error(layer):
+                scene = inserted(scene, best.layer)
+    return descended(scene, sizes.joint, search, AFTER)
 
 
 def _seen_through(cut: Opening, around: Surroundings) -> float:

@@ -108,6 +108,17 @@ def test_a_ring_is_one_layer(drawn):
     assert quality(scene, picture).psnr >= 38
 
 
+def test_a_hole_through_two_layers_is_cut_out_of_both(drawn):
+    """Nothing that could be laid on them would be transparent."""
+    mask = '<mask id="m"><rect width="96" height="96" fill="white"/><circle cx="48" cy="44" r="16"/></mask>'
+    layers = '<path d="M8 8H88V60H8Z" fill="#d02040"/><path d="M8 40H88V88H8Z" fill="#2040d0"/>'
+    picture = drawn(f'{mask}<g mask="url(#m)">{layers}</g>')
+    scene = fit(picture)
+    assert quality(scene, picture).psnr >= 38
+    assert [len(layer.shapes) for layer in scene.layers] == [2, 2]
+    assert all(layer.joints[0].join == "subtraction" for layer in scene.layers)
+
+
 def test_only_kinds_that_the_user_allows_are_found(drawn):
     assert kinds_of(fit(drawn(WHITE + DISC), kind="ellipse")) == ["ellipse"]
 
@@ -233,6 +244,9 @@ def test_the_ground_is_the_colour_that_dominates():
     target[:, :8] = 0.1
     assert np.allclose(ground_of(torch.from_numpy(target))[:3], 0.9, atol=1e-6)
     assert ground_of(torch.zeros(4, 5, 5)).tolist() == [0.0] * 4
+    corner = torch.ones(4, 5, 5)
+    corner[:, 0, 0] = 0.0
+    assert ground_of(corner).tolist() == [0.0] * 4  # nothing that is laid on a ground makes a hole in it
     shades = torch.linspace(0, 1, 300).reshape(1, 15, 20).repeat(3, 1, 1)
     assert math.isclose(float(ground_of(shades)[0]), 0.5, abs_tol=0.01)
 

@@ -10,7 +10,7 @@ import torch
 
 from sdf2vec.fit import surroundings
 from sdf2vec.fit.levenberg import Dense, Numbers, descend
-from sdf2vec.fit.regions import ellipses
+from sdf2vec.fit.regions import ellipses, strokes
 from sdf2vec.fit.surroundings import MOST_COMPILED, Surroundings, View
 from sdf2vec.layer import Part, row_width
 from sdf2vec.render.tensors import from_scene
@@ -56,6 +56,22 @@ def test_two_squares_give_also_one_ellipse_through_both_that_ends_with_them():
     assert long == pytest.approx(16.0, abs=0.5)
     assert short == pytest.approx(2.0, abs=0.5)
     assert abs(math.sin(turn)) == pytest.approx(1.0)
+
+
+def test_an_angle_gives_its_two_strokes():
+    region = np.zeros((40, 40), bool)
+    region[5:35, 5:9] = region[31:35, 5:30] = True
+    upright, level = strokes(region)
+    assert (int(upright.sum()), int(level.sum())) == (30 * 4, 25 * 4)
+    assert upright[5:35, 5:9].all()
+    assert level[31:35, 5:30].all()
+
+
+def test_a_bar_and_a_square_have_no_strokes():
+    for rows, columns in ((slice(10, 14), slice(5, 35)), (slice(5, 35), slice(5, 35))):
+        region = np.zeros((40, 40), bool)
+        region[rows, columns] = True
+        assert strokes(region) == []
 
 
 def test_where_nothing_is_wanted_there_is_no_ellipse():

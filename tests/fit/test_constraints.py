@@ -8,7 +8,7 @@ import torch
 
 from sdf2vec import Layer, Scene, Shape
 from sdf2vec.expr import var
-from sdf2vec.fit.constraints import areas_of, enforce_min_thickness, too_small
+from sdf2vec.fit.constraints import areas_of, enforce_min_thickness, project, too_small
 from sdf2vec.graph import components_of
 from sdf2vec.lower.torch import compile_torch
 from sdf2vec.operation import VEC2
@@ -164,3 +164,13 @@ def test_round_shapes_are_thickened_too():
     assert float(circle.of("radius", 0)) == pytest.approx(0.01)
     assert ellipse.of("radii", 0).flatten().tolist() == pytest.approx([0.3, 0.01])
     assert box.of("half_size", 0).flatten().tolist() == pytest.approx([0.01, 0.01])
+
+
+def test_corners_are_no_rounder_than_a_box_is_large():
+    """Beyond that the distance does not change with the radius, so that no descent would lead back."""
+    x, y, half_width, half_height, angle, radius = SHAPES["box"]
+    tensors = tensors_of(
+        ("box", (x, y, half_width, half_height, angle, 0.9)), ("box", (x, y, 0.05, 0.2, angle, radius))
+    )
+    project(tensors, 1 / 64)
+    assert tensors.groups[0].of("corner_radius", 0)[:, 0].tolist() == pytest.approx([0.2, 0.05], rel=2e-3)
