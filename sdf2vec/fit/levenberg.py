@@ -14,7 +14,7 @@ import torch
 FIRST_DAMPING, LESS, MORE = 0.1, 0.3, 5.0  # of a step; after one that helps, after one that does not
 MOST_DAMPED, LEAST_DAMPED = 1e4, 1e-7
 HARDLY, PATIENCE = 1e-3, 6  # share of the error; steps
-FAINT = 1e-4  # of the greatest effect of a number, in squares
+FAINT = 1e-3  # of the greatest effect of a number, in squares
 TINY = 1e-9
 
 

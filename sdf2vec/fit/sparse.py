@@ -15,6 +15,7 @@ from functools import partial
 import torch
 
 from ..paints import BASE
+from ..render.reference import layers_at
 from ..render.tensors import SceneTensors
 from .adam import adam_over
 from .candidates import Opening, cut_from, in_place_of
@@ -24,7 +25,7 @@ from .least_squares import count_numbers, improved
 from .offers import NEAR, Offer, choices, instead_of, offers
 from .presets import Phase
 from .ramps import lowest
-from .surroundings import Surroundings, View, layer_at, residual_of, some
+from .surroundings import Surroundings, View, layer_at, points_of, residual_of, some
 
 FLOOR = 10**-4.4  # mean squared error, 44 dB: below it nothing is missing
 FEW = 24  # layers that are descended one by one, too
@@ -35,6 +36,7 @@ JOINT = Phase("joint", 60, 0, rate=0.3, end_rate=0.02)
 AFTER = Phase("after", 40, 0, rate=0.2, end_rate=0.02)  # one layer was taken out
 LAST = Phase("last", 150, 0, rate=0.3, end_rate=0.01)
 MOVED = 0.98  # of the error, at most, after a layer was moved in the draw order
+UNSEEN = 0.5 / 255  # coverage
 HELPS = 0.92  # of the error before, at most, after as many rounds as there is patience for
 PATIENCE, CLOSE = 2, 10**-3.9  # rounds; mean squared error, 39 dB, below which there is none for a second
 NEEDLESS, HOPEFUL = 1.05, 6.0  # how much the error may rise by a layer taken out: after a descent; before it
@@ -172,17 +174,35 @@ def _each_improved(scene: SceneTensors, view: View, search: Search) -> SceneTens
     return scene
 
 
+@torch.no_grad()
 def _reordered(scene: SceneTensors, view: View) -> SceneTensors:
     """The scene with each layer at the place of the draw order where the error is least."""
-    error = error_of(scene, view)
+    error, touching = error_of(scene, view), _touching(scene, view)
     for order in range(scene.layer_count):
         layer, rest = layer_at(scene, order), without(scene, order)
-        for place in range(scene.layer_count):
+        touched = [other - (other > order) for other in touching[order].nonzero()[:, 0].tolist()]
+        for place in _other_places(order, touched):
             moved = inserted(_opened(rest, place), replace(layer, order=torch.tensor([place])))
             found = error_of(moved, view)
             if found < MOVED * error:
-                scene, error = moved, found
+                scene, error, touching = moved, found, _touching(moved, view)
     return scene
+
+
+def _touching(scene: SceneTensors, view: View) -> torch.Tensor:
+    """Which layers are seen in the same places, [N, N] in draw order."""
+    covers, _ = layers_at(scene, *points_of(scene, view))
+    seen = (covers > UNSEEN).float()
+    return ((seen @ seen.T) > 0).fill_diagonal_(False)
+
+
+def _other_places(order: int, touched: list[int]) -> list[int]:
+    """Where else among the other layers one may be, of all places that differ: right above one that it touches, or
+    below all of them.
+    """
+    places = [*touched[:1], *(other + 1 for other in touched)]
+    here = sum(other < order for other in touched)
+    return [place for below, place in enumerate(places) if below != here]
 
 
 @torch.no_grad()
