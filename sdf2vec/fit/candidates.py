@@ -32,6 +32,7 @@ from .surroundings import Surroundings
 ellipses_of: Callable[..., Any] = deferred("sdf2vec.fit.regions", "ellipses")  # scikit-image
 
 KEPT = 6  # starts of a kind in an opening that are trained
+SAME = 1e-4  # part of an error by which two starts differ at least
 BLURS, STEPS = (3.0, 1.0), 4  # sizes of a pixel in pixels, one after the other; steps with each
 START_SMOOTHNESS = 0.003  # scene units
 EAGER = 0.25  # how much an error matters where a first shape is not wanted: what is too much can be cut out
@@ -287,7 +288,7 @@ class Proposer:
         for mask, placed in zip(masks, starts, strict=True):
             fresh = _rows(structure, placed)
             errors = _misses(structure, [mask] * len(fresh), around, BLURS[0]).errors(fresh)
-            best.append(fresh[errors.argsort(stable=True)[:kept]])
+            best.append(fresh[_distinct(errors)[:kept]])
         counts = [len(rows) for rows in best]
         spread = [mask for mask, count in zip(masks, counts, strict=True) for _ in range(count)]
         numbers = self.numbers(structure, _is_geometry)
@@ -312,6 +313,12 @@ class Proposer:
             torch.cat([found[:, 4], found[:, 4] + torch.pi, turns]),
             torch.cat([stretches, stretches, torch.ones_like(stretches)]),
         )
+
+
+def _distinct(errors: torch.Tensor) -> torch.Tensor:
+    """Places [K] of errors [N] from the least up, of equal ones but one: a start that is turned to no effect."""
+    ranked, order = errors.sort(stable=True)
+    return order[torch.cat([torch.ones(1, dtype=torch.bool), ranked.diff() > SAME * ranked[1:]])]
 
 
 def _is_geometry(slot: Slot) -> bool:

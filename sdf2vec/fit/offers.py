@@ -50,6 +50,10 @@ PRICE = 0.02  # of a number, in logarithms of what is left
 CUT = 4  # shapes from which others are cut
 LEAST_GAIN = 0.02  # of what is missing, by a shape that is worth its numbers
 CUTTABLE = 0.3  # how much harm matters where it may be cut away
+HARMLESS, MUCH = (
+    0.03,
+    0.35,
+)  # shares of what a region is worth: harm, at most, by one of its parts; gain, at least
 WEAK = 0.2  # of the greatest gain: what is clean and gains less waits
 BLAME = 2.0  # for what is left, where clean shapes are rivals
 WORTH, HOPELESS = 0.05, 1.5  # least share of all that is missing, most that is left, where shapes are cut
@@ -140,9 +144,24 @@ class Offer:
         return self.order, (red, green, blue)
 
     @property
+    def aim(self) -> tuple[int, Color, bool]:
+        """Its purpose, and whether it is for all of it."""
+        return (*self.purpose, self.is_within)
+
+    @property
     def kind(self) -> str:
         """Of its shape."""
         return self.layer.structure[0].kind
+
+    @property
+    def is_within(self) -> bool:
+        """Whether it is one shape that covers much of its region and nothing else: one of several that make it up."""
+        return not self.is_joined and self.harm < HARMLESS and self.gain > MUCH * self.potential
+
+    @property
+    def by_number(self) -> float:
+        """Its gain by the numbers that it takes."""
+        return self.gain / row_width(self.layer.structure)
 
     @property
     def is_joined(self) -> bool:
@@ -173,11 +192,14 @@ def choices(best: Sequence[Offer]) -> Iterator[list[Offer]]:
     What has a hole waits for plain shapes: these may hide what the hole is for.
     """
     most = max((offer.gain for offer in best), default=0.0)
-    clean = _apart([offer for offer in best if offer.left < CLEAN and offer.gain > WEAK * most])
-    clean = [offer for offer in clean if not offer.is_joined] or clean
-    if clean:
-        yield clean
-    if best and clean != best[:1]:
+    worthy = [offer for offer in best if offer.gain > WEAK * most]
+    clean = _apart([offer for offer in worthy if offer.left < CLEAN])
+    plain = [offer for offer in clean if not offer.is_joined]
+    dense = [offer for offer in worthy if offer.is_within and offer.by_number >= best[0].by_number]
+    chosen = plain or clean or _apart(dense)
+    if chosen:
+        yield chosen
+    if best and chosen != best[:1]:
         yield list(best[:1])
 
 
@@ -201,7 +223,7 @@ def _found(
     ]
     gaining = sorted(
         (offer for offer in every if offer.gain > 0),
-        key=lambda offer: (offer.left > NEARLY_CLEAN, offer.left > ROUGH, -offer.gain),
+        key=lambda offer: (offer.left > NEARLY_CLEAN, offer.left > ROUGH, not offer.is_within, -offer.gain),
     )
     best = [_best(tries, floor) for tries in _refined(_tries(gaining), around, search) if tries]
     cut = (_cut(base, around, search) for base in _unfit(every, best, around))
@@ -272,14 +294,14 @@ def _tries(found: Sequence[Offer]) -> list[list[Offer]]:
     for offer in found:
         if len(seeds) == MOST or offer.gain < WEAKEST * found[0].gain:
             break
-        rivals = (seed for seed in seeds if seed.purpose == offer.purpose)
+        rivals = (seed for seed in seeds if seed.aim == offer.aim)
         if all(_overlap(offer.cover, seed.cover) < APART for seed in rivals):
             seeds.append(offer)
     groups = []
     for seed in seeds:
         kinds: dict[str, list[Offer]] = defaultdict(list)
         for offer in found:
-            if offer.purpose == seed.purpose and _likeness(offer.cover, seed.cover) > ALIKE:
+            if offer.aim == seed.aim and _likeness(offer.cover, seed.cover) > ALIKE:
                 kinds[offer.kind].append(offer)
         groups.append([offer for own in kinds.values() for offer in own[:EACH]])
     return groups

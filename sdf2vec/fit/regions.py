@@ -14,6 +14,7 @@ LEAST = 0.2  # of the greatest gain: what belongs to a region
 MOST_REGIONS, MOST_PAIRS = 5, 4  # regions; of which pairs are made
 MOST_BRANCHED, MOST_STROKES = 2, 5  # regions whose strokes are looked for; strokes of each
 LEAST_STROKE, MOST_STROKE = 0.05, 0.9  # share of the region
+SLENDER = 1.3  # a stroke's length, at least, by the greatest thickness
 SMALLEST = 0.02  # share of all gain that a region has at least
 THINNEST = 0.5  # pixels: half an ellipse's shorter axis
 
@@ -50,10 +51,10 @@ def _regions(gain: np.ndarray) -> Iterator[np.ndarray]:
 def strokes(region: np.ndarray) -> list[np.ndarray]:
     """The straight strokes of a region [H, W] that is longer than thick, as masks, the largest first; none of others.
 
-    They are what a line twice as long as the region is thick fits into, in one of four directions.
+    They are what a line `SLENDER` times as long as the region is thick fits into, in one of four directions.
     """
     padded = np.pad(region, 1)
-    reach = math.ceil(2.0 * ndimage.distance_transform_edt(padded).max())
+    reach = math.ceil(SLENDER * ndimage.distance_transform_edt(padded).max())
     found = []
     for line in _lines(reach):
         if max(line.shape) > max(region.shape):
