@@ -16,6 +16,7 @@ from .results import Run
 
 COLUMNS = 3
 WIDE = 100.0  # times the least cost: of a panel that reaches farther, only 1, 10, 100, … have labels
+ROOM = 0.16, 0.045  # of a panel, across and down, that the name of a point takes
 COLORS = {"ours": "#0b61a4", "variant": "#57a0d3", "thesis": "#d1495b", "peer": "#e0a030"}
 SIGNS = {"ours": "o", "variant": ".", "thesis": "s", "peer": "^"}
 ABOUT = {
@@ -102,6 +103,18 @@ def _labelled(costs: Sequence[float]) -> tuple[float, ...]:
     return (1.0,) if wide else (1.0, 2.0, 5.0)
 
 
+def _apart(best: Sequence[Point], panel: Axes) -> list[Point]:
+    """Those of a front whose names have room, from its beginning on."""
+    places = panel.transAxes.inverted().transform(
+        panel.transData.transform([(point.cost, point.value) for point in best])
+    )
+    named: list[int] = []
+    for index, (x, y) in enumerate(places):
+        if all(abs(x - places[other][0]) > ROOM[0] or abs(y - places[other][1]) > ROOM[1] for other in named):
+            named.append(index)
+    return [best[index] for index in named]
+
+
 def _fill(panel: Axes, found: Sequence[Point], up: str) -> None:
     """All points, and the front with names."""
     panel.set_xscale("log")
@@ -120,7 +133,7 @@ def _fill(panel: Axes, found: Sequence[Point], up: str) -> None:
     xs, ys = [p.cost for p in best], [p.value for p in best]
     panel.plot(xs, ys, color="#333333", linewidth=1, drawstyle="steps-post", zorder=1)
     side = 3 if up == "flip" else -3
-    for index, point in enumerate(best):
+    for index, point in enumerate(_apart(best, panel)):
         above = index % 2 == 0
         panel.annotate(
             point.name,

@@ -72,7 +72,10 @@ def grow(
     """
     kept, count, wasted = error_of(scene, sizes.joint), scene.layer_count, 0
     while scene.layer_count < most and kept > floor and wasted < (PATIENCE if kept > CLOSE else 1):
-        made, now = _better(_alternatives(scene, sizes, search, most, floor), sizes.joint, HELPS * kept)
+        found = _better(_alternatives(scene, sizes, search, most, floor), sizes.joint, HELPS * kept)
+        if found is None:
+            return
+        made, now = found
         if now <= HELPS * kept or made.layer_count < count:
             yield Round(made, now, kept)
             kept, count, wasted = now, made.layer_count, 0
@@ -83,15 +86,14 @@ def grow(
         scene = made
 
 
-def _better(made: Iterable[SceneTensors], view: View, enough: float) -> tuple[SceneTensors, float]:
+def _better(made: Iterable[SceneTensors], view: View, enough: float) -> tuple[SceneTensors, float] | None:
     """The first scene whose mean squared error is low enough, or that with the lowest; and the error."""
     best: tuple[SceneTensors, float] | None = None
     for scene in made:
-        found = scene, error_of(scene, view)
-        best = found if best is None or found[1] < best[1] else best
-        if best[1] <= enough:
+        error = error_of(scene, view)
+        best = (scene, error) if best is None or error < best[1] else best
+        if error <= enough:
             break
-    assert best is not None
     return best
 
 

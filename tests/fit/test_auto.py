@@ -119,6 +119,13 @@ def test_a_hole_through_two_layers_is_cut_out_of_both(drawn):
     assert all(layer.joints[0].join == "subtraction" for layer in scene.layers)
 
 
+def test_a_search_that_has_nothing_to_try_ends(drawn, monkeypatch):
+    """More layers than are moved one by one, and no shape that would help."""
+    monkeypatch.setattr(import_module("sdf2vec.fit.sparse"), "FEW", 0)
+    monkeypatch.setattr(import_module("sdf2vec.fit.sparse"), "choices", lambda best: iter(()))
+    assert fit(drawn(WHITE + DISC), max_shapes=4, preset="fast").shape_count <= 4
+
+
 def test_only_kinds_that_the_user_allows_are_found(drawn):
     assert kinds_of(fit(drawn(WHITE + DISC), kind="ellipse")) == ["ellipse"]
 
