@@ -122,6 +122,7 @@ def _fill(panel: Axes, found: Sequence[Point], up: str) -> None:
     panel.xaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:,.7g}"))
     panel.xaxis.set_minor_formatter(NullFormatter())
     panel.grid(alpha=0.25, which="both")
+    panel.margins(x=1.25 * ROOM[0])
     for family in COLORS:
         own = [point for point in found if point.family == family]
         if own:
@@ -132,15 +133,15 @@ def _fill(panel: Axes, found: Sequence[Point], up: str) -> None:
         return
     xs, ys = [p.cost for p in best], [p.value for p in best]
     panel.plot(xs, ys, color="#333333", linewidth=1, drawstyle="steps-post", zorder=1)
-    side = 3 if up == "flip" else -3
-    for index, point in enumerate(_apart(best, panel)):
-        above = index % 2 == 0
+    below = up == "flip"  # on the side of the front where no points are
+    for point in _apart(best, panel):
         panel.annotate(
             point.name,
             (point.cost, point.value),
-            xytext=(3, side if above else -3 * side),
+            xytext=(-3, -3 if below else 3),
             textcoords="offset points",
             fontsize=5,
             color=COLORS[point.family],
-            va="bottom" if (side > 0) == above else "top",
+            ha="right",
+            va="top" if below else "bottom",
         )

@@ -104,7 +104,7 @@ def _alternatives(
     for found in choices(_offers(scene, sizes.search, search, floor)):
         made = _descended(_with(scene, found[: most - scene.layer_count]), sizes, search)
         yield _rethought(pruned(made, sizes, search, floor), sizes, search, floor)
-    if scene.layer_count <= FEW:
+    if 0 < scene.layer_count <= FEW:
         yield _carved(scene, sizes, search, floor)
         yield _exchanged(scene, sizes, search)
 

@@ -120,8 +120,7 @@ def test_a_hole_through_two_layers_is_cut_out_of_both(drawn):
 
 
 def test_a_search_that_has_nothing_to_try_ends(drawn, monkeypatch):
-    """More layers than are moved one by one, and no shape that would help."""
-    monkeypatch.setattr(import_module("sdf2vec.fit.sparse"), "FEW", 0)
+    """No shape would help, and there is none that could be changed."""
     monkeypatch.setattr(import_module("sdf2vec.fit.sparse"), "choices", lambda best: iter(()))
     assert fit(drawn(WHITE + DISC), max_shapes=4, preset="fast").shape_count <= 4
 
