@@ -21,7 +21,7 @@ EXPLAINED = (
 )
 SHARE, MORE = 0.3, 1.5  # least share of the canvas that is a ramp; and of what is one flat colour
 MARGIN = 0.1  # scene units by which the box is larger than the canvas
-LEAST_SLOPE = 0.02  # change of a colour across a scene unit
+LEAST_CHANGE = 0.02  # of a colour across the canvas
 STEPS, TRIMS = 10, 4
 
 
@@ -47,7 +47,9 @@ def grounded(scene: SceneTensors, view: View, search: Search) -> SceneTensors:
     if plane.explains < EXPLAINED and plane.near.float().mean() < max(SHARE, MORE * flat):
         return scene
     ramp = _on_ramp(scene, plane, points, view, search)
-    is_one = plane.slopes.norm() > LEAST_SLOPE and _near(ramp, view) > max(SHARE, MORE * flat)
+    is_one = plane.slopes.norm() * max(scene.size) > LEAST_CHANGE and _near(ramp, view) > max(
+        SHARE, MORE * flat
+    )
     return ramp if is_one else scene
 
 

@@ -119,6 +119,14 @@ def test_a_hole_through_two_layers_is_cut_out_of_both(drawn):
     assert all(layer.joints[0].join == "subtraction" for layer in scene.layers)
 
 
+def test_a_ramp_a_pixel_high_is_one_box():
+    """On a canvas three hundred times as wide as high a colour changes little across a scene unit."""
+    pixels = np.repeat(np.linspace(0, 1, 300, dtype=np.float32)[None, :, None], 3, axis=2)
+    scene = fit(Picture(pixels))
+    assert kinds_of(scene) == ["box"]
+    assert quality(scene, Picture(pixels)).psnr >= 50
+
+
 def test_a_search_that_has_nothing_to_try_ends(drawn, monkeypatch):
     """No shape would help, and there is none that could be changed."""
     monkeypatch.setattr(import_module("sdf2vec.fit.sparse"), "choices", lambda best: iter(()))
