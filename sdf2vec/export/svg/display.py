@@ -36,7 +36,14 @@ class Path:
     contours: tuple[Contour, ...]
 
 
-Geometry = Outline | Path
+@dataclass(frozen=True)
+class Outlines:
+    """What lies within an odd number of outlines, which nowhere cross."""
+
+    each: tuple[Outline, ...]
+
+
+Geometry = Outline | Path | Outlines
 
 
 class Stop(NamedTuple):

@@ -5,18 +5,19 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from typing import cast
 
 import numpy as np
 
 from ...grain import Grain
-from ...outlines import EllipseOutline
+from ...outlines import EllipseOutline, Outline
 from ...scene import Color, Layer, Scene
 from ...shapes import KINDS
 from .bezier_fit import smooth_path, straight_path
 from .blur import Blurred
 from .canvas import Canvas
 from .compact import drawn_difference, drawn_figure, figure
-from .display import Drawing, Figure, Group, Item, LinearGradient, Path
+from .display import Drawing, Figure, Group, Item, LinearGradient, Outlines, Path
 from .gradients import SoftEdge, ellipse, radial, sliced
 from .isobands import (
     Band,
@@ -32,6 +33,7 @@ from .outlines import TOLERANCE, core, edge_of, placed, upright
 from .plan import Detail, Plan
 from .refit_appearance import HASTY, refitted
 from .sampling import covers
+from .uncrossed import uncrossed
 from .union_gradient import fill_of, mean_color, ramp_of
 from .union_partition import part_bands
 from .visibility import layers_at
@@ -109,6 +111,10 @@ class Painter:
         outline = edge_of(layer, 0.5)
         if outline is not None:
             return Figure(placed(outline, self.plan.canvas), fill, layer.opacity)
+        outlines = uncrossed(layer, self.plan.canvas)
+        if outlines is not None:
+            each = tuple(cast("Outline", placed(outline, self.plan.canvas)) for outline in outlines)
+            return Figure(Outlines(each), fill, layer.opacity)
         found = layer_contours(layer, [0.5], self.plan.canvas)
         path = smooth_path(found[0].contours, TOLERANCE, self.plan.canvas) if found else NOWHERE
         return Figure(path, fill, layer.opacity)

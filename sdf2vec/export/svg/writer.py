@@ -16,7 +16,7 @@ from xml.sax.saxutils import escape
 import numpy as np
 import svgwrite
 
-from ...outlines import EllipseOutline, Point, PolygonOutline, RectangleOutline
+from ...outlines import EllipseOutline, Outline, Point, PolygonOutline, RectangleOutline
 from ...scene import Color
 from ..exported import MARK
 from .canvas import Points, pairs
@@ -27,12 +27,13 @@ from .display import (
     Geometry,
     Item,
     LinearGradient,
+    Outlines,
     Path,
     RadialGradient,
     Stop,
 )
 from .filter_regions import Region, region_of, rounding_of, shared_regions
-from .outlines import convex, sides
+from .outlines import convex, core, sides
 
 Element = Any  # svgwrite has no types
 Attributes = dict[str, str | None]
@@ -252,11 +253,14 @@ class _Writer:
         if self.style.compact:
             turned = (np.roll(points, -first, axis=0) for first in range(len(points)))
             data = min((self._relative(Contour.straight(pairs(corners))) for corners in turned), key=len)
-        elif geometry.rounding < FLAT:
-            data = f"M{self._joined(points)}Z"
         else:
-            data = self._rounded(points, geometry.rounding)
+            data = self._polygon(points, geometry.rounding)
         return self._with(self.svg.path(data), look)
+
+    @element.register
+    def _(self, geometry: Outlines, look: Attributes) -> Element:
+        data = "".join(map(self._closed, geometry.each))
+        return self._with(self.svg.path(data), look | {"fill-rule": "evenodd"})
 
     @element.register
     def _(self, geometry: Path, look: Attributes) -> Element:
@@ -266,6 +270,22 @@ class _Writer:
     def _with(self, element: Element, look: Mapping[str, str | None]) -> Element:
         element.attribs.update({key: value for key, value in look.items() if value is not None})
         return element
+
+    def _closed(self, outline: Outline) -> str:
+        """Path data of an outline."""
+        made = core(outline)
+        if made is not None:
+            return self._polygon(*made)
+        assert isinstance(outline, EllipseOutline)
+        (x, y), (across, down), angle = outline.center, outline.radii, outline.angle
+        along = np.array([math.cos(angle), math.sin(angle)]) * across
+        one, other = (self._joined(np.array([[x, y]]) + sign * along) for sign in (-1.0, 1.0))
+        arc = f"A{self.number(across)} {self.number(down)} {self.fine(math.degrees(angle) % 180.0)} 0 1 "
+        return f"M{one}{arc}{other}{arc}{one}Z"
+
+    def _polygon(self, points: Points, rounding: float) -> str:
+        """Path data of a polygon grown by a rounding."""
+        return f"M{self._joined(points)}Z" if rounding < FLAT else self._rounded(points, rounding)
 
     def _rounded(self, points: Points, rounding: float) -> str:
         """Straight edges moved outwards, joined by arcs."""

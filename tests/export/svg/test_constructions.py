@@ -12,6 +12,7 @@ from sdf2vec.export.svg.blur import best_blur, trial_of
 from sdf2vec.export.svg.canvas import Canvas
 from sdf2vec.export.svg.outlines import distance_to, edge_of
 from sdf2vec.render.reference import render
+from sdf2vec.scene import Joint
 from sdf2vec.shapes import KINDS
 from tests.export.svg.drawings import (
     BLACK,
@@ -209,3 +210,18 @@ def test_smaller_than_any_pixel():
     for falloff in (0.0, 0.1, 64.0):
         root = parsed(scene_of(Layer((shape,), falloff), width=1, height=1))
         assert drawn_in(root)
+
+
+@pytest.mark.parametrize("size", [None, (96, 64), (303, 202)])
+def test_holes_are_where_they_are_rendered(require_engine, size):
+    """A turned ellipse and a round box cut out of a box, and a polygon beside it."""
+    require_engine("resvg")
+    box = Shape.of("box", ORANGE, center=(-0.1, 0), half_size=(0.5, 0.4), angle=0.1, corner_radius=0.1)
+    hole = Shape.of("ellipse", ORANGE, center=(-0.3, 0.05), radii=(0.2, 0.08), angle=0.6)
+    window = Shape.of("box", ORANGE, center=(0.15, 0), half_size=(0.1, 0.2), angle=-0.3, corner_radius=0.03)
+    beside = Shape.of("triangle", ORANGE, a=(0.6, -0.2), b=(0.7, 0.3), c=(0.5, 0.3))
+    joints = (Joint("subtraction"), Joint("subtraction"), Joint("union"))
+    scene = Scene(150, 100, (Layer((box, hole, window, beside), 0.0, 0.9, joints),), (0.2, 0.3, 0.4))
+    off = off_in("resvg", scene, size)
+    assert -10 * np.log10(np.square(off).mean()) > 36
+    assert abs(float(off.mean())) < 0.5 / 255

@@ -1,9 +1,10 @@
 """Layers as items of the display list."""
 
+import numpy as np
 import pytest
 
-from sdf2vec import Layer, Scene, Shape
-from sdf2vec.export.svg.display import Figure, Group, LinearGradient, Path, RadialGradient
+from sdf2vec import Joint, Layer, Scene, Shape
+from sdf2vec.export.svg.display import Figure, Group, LinearGradient, Outlines, Path, RadialGradient
 from sdf2vec.export.svg.layers import drawing
 from sdf2vec.export.svg.plan import DETAILS, Planner
 from sdf2vec.outlines import EllipseOutline, PolygonOutline
@@ -57,3 +58,27 @@ def test_soft_bands_are_rings_with_filters_and_steps_without():
     assert all(figure.antialiased for figure in steps.items)
     assert [len(figure.geometry.contours) for figure in rings.items[:-1]] == [2] * (len(rings.items) - 1)
     assert {len(figure.geometry.contours) for figure in steps.items} == {1}
+
+
+def cut(x, radius, smoothness=0.0, join="subtraction"):
+    """The disc joined with another at some place."""
+    other = Shape.of("circle", RED, center=(x, 0), radius=radius)
+    return Layer((DISC, other), 0.0, 1.0, (Joint(join, smoothness),))
+
+
+@pytest.mark.parametrize("layer", [cut(0.05, 0.1), cut(0.05, 0.1, 0.003), cut(0.6, 0.1, join="union")])
+def test_edges_that_do_not_cross_are_those_of_the_shapes(layer):
+    (figure,) = items(layer)
+    assert isinstance(figure.geometry, Outlines)
+    radii = [outline.radii for outline in figure.geometry.each if isinstance(outline, EllipseOutline)]
+    assert np.allclose(radii, [(50, 50), (20, 20)])
+
+
+@pytest.mark.parametrize(
+    "layer",
+    [cut(0.2, 0.1), cut(0.15, 0.1), cut(0.6, 0.1), cut(0.05, 0.1, 0.05), cut(0.05, 0.1, join="union")],
+    ids=["crossing", "touching", "a cutter outside", "a smooth cut", "one within the other"],
+)
+def test_edges_that_are_not_those_of_the_shapes_are_traced(layer):
+    (figure,) = items(layer)
+    assert isinstance(figure.geometry, Path)

@@ -1,0 +1,49 @@
+"""Joined shapes whose edges nowhere cross, such as a ring: their own outlines make up the layer's edge."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ...arrays import Float64Array
+from ...outlines import Outline
+from ...scene import Layer
+from .canvas import Canvas
+from .isobands import trace_grid
+from .outlines import TOLERANCE, edge_of
+from .sampling import distances
+
+NEAR = 2.0  # user units, or grid cells where these are larger, around an edge
+MOST = 16  # shapes
+
+
+def uncrossed(layer: Layer, canvas: Canvas) -> tuple[Outline, ...] | None:
+    """The outlines of a sharp layer's shapes where what lies within an odd number of them is the layer; else None.
+
+    It is so where all are on the canvas, at no place of a grid two edges are near, the layer's is near where one of
+    them is, and it covers what the outlines say.
+    """
+    shapes = [Layer((shape,), layer.falloff, layer.opacity) for shape in layer.shapes]
+    grid = trace_grid(layer, canvas) if 1 < len(shapes) <= MOST else None
+    outlines = [edge_of(shape, 0.5) for shape in shapes] if grid is not None else []
+    if grid is None or None in outlines:
+        return None
+    whole, each = distances(layer, grid), np.stack([distances(shape, grid) for shape in shapes])
+    near = max(NEAR / canvas.unit, NEAR * grid.step)
+    is_same = _is_parity(whole, each, near) and _is_near(whole, each, near, TOLERANCE / canvas.unit)
+    return tuple(outline for outline in outlines if outline is not None) if is_same else None
+
+
+def _is_parity(whole: Float64Array, each: Float64Array, near: float) -> bool:
+    """Whether a layer covers what lies within an odd number of edges, wherever none is near; two nowhere are."""
+    close, inside = np.abs(each) < near, each < 0.0
+    is_same = (whole < 0.0) == (inside.sum(axis=0) % 2 == 1)
+    return bool(
+        inside.any(axis=(1, 2)).all() and (close.sum(axis=0) < 2).all() and is_same[~close.any(axis=0)].all()
+    )
+
+
+def _is_near(whole: Float64Array, each: Float64Array, near: float, off: float) -> bool:
+    """Whether a layer's edge is where those of its shapes are."""
+    nearest = np.abs(each).min(axis=0)
+    close = nearest < near / 2.0
+    return bool((np.abs(np.abs(whole) - nearest)[close] < off).all())
