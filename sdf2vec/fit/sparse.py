@@ -100,7 +100,7 @@ def _better(made: Iterable[SceneTensors], view: View, enough: float) -> tuple[Sc
 def _alternatives(
     scene: SceneTensors, sizes: Sizes, search: Search, most: int, floor: float
 ) -> Iterator[SceneTensors]:
-    """What a round may come to: with shapes that explain regions, with the one that gains most, with holes."""
+    """What a round may come to: with shapes that explain regions, the one that gains most, holes, other shapes."""
     for found in choices(_offers(scene, sizes.search, search, floor)):
         made = _descended(_with(scene, found[: most - scene.layer_count]), sizes, search)
         yield _rethought(pruned(made, sizes, search, floor), sizes, search, floor)
