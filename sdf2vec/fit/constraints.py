@@ -14,7 +14,7 @@ from ..render.tensors import Group, SceneTensors
 from ..shapes import KINDS
 from ..units import BACKGROUND, LONGEST, Room
 
-ALMOST = 0.999
+ALMOST = 0.999  # of the most that a number may be: there it still changes something
 NEWTON_STEPS = 6  # towards the least thickness, at most
 FLAT = 0.1  # squared derivative of a thickness, which is 1 and more unless the shape is next to a point
 GOLDEN = 2.39996  # radians; multiples of it never meet

@@ -242,9 +242,9 @@ class Search:
         fewer = (Tried(less, around.error(less)) for less in reductions(tried.layer))
         return [*worth.best(kinds)[:FINALISTS], *worth.best(fewer)[:1]]
 
-    def filled(self, place: Opening, around: Surroundings) -> Tried | None:
-        """The layer with the best shape in an opening, where anything is wanted there."""
-        tried = (self.refined(likely.layer, around) for likely in self.likely(place, around))
+    def filled(self, place: Opening, around: Surroundings, finer: Surroundings) -> Tried | None:
+        """The layer with the best shape in an opening, refined in finer surroundings; None where nothing is wanted."""
+        tried = (self.refined(likely.layer, finer) for likely in self.likely(place, around))
         return min(tried, key=lambda found: found.error, default=None)
 
     def likely(self, place: Opening, around: Surroundings) -> list[Tried]:
@@ -267,20 +267,26 @@ class Search:
     def numbers(self, around: Surroundings, structure: Structure, moves: Callable[[Slot], bool]) -> Numbers:
         """Which numbers of a structure's rows move, how far in one step, and what keeps them in their range."""
         scene = around.scene
-        side = math.sqrt(scene.size[0] * scene.size[1])
-        free = [moves(slot) for slot in slots(structure) for _ in range(slot.parameter.width)]
-        rates = [
-            rate_of(slot.parameter.unit, side, LONGEST_STEP)
-            for slot in slots(structure)
-            for _ in range(slot.parameter.width)
-            if moves(slot)
-        ]
+        every = [moves(slot) for slot in slots(structure) for _ in range(slot.parameter.width)]
+        free = torch.tensor(every).nonzero()[:, 0]
 
         def keep(rows: torch.Tensor) -> None:
             group = layer_of(structure, torch.zeros(1, dtype=torch.int64), rows)
             project(replace(scene, groups=[group]), self.pixel, self.falloff)
 
-        return Numbers(torch.tensor(free).nonzero()[:, 0], torch.tensor(rates), keep)
+        return Numbers(free, longest_steps(structure, scene)[free], keep)
+
+
+def longest_steps(structure: Structure, scene: SceneTensors) -> torch.Tensor:
+    """How far each number of a structure's rows [U] may move in one step."""
+    side = math.sqrt(scene.size[0] * scene.size[1])
+    return torch.tensor(
+        [
+            rate_of(slot.parameter.unit, side, LONGEST_STEP)
+            for slot in slots(structure)
+            for _ in range(slot.parameter.width)
+        ]
+    )
 
 
 def layer_of(structure: Structure, order: torch.Tensor, rows: torch.Tensor) -> Group:

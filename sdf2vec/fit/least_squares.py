@@ -25,7 +25,7 @@ from ..threads import in_threads, threads
 from ..units import BACKGROUND, COLOR
 from .adam import rate_of
 from .constraints import enforce_min_thickness, project
-from .joining import LONGEST_STEP, Search, detached, layer_of
+from .joining import LONGEST_STEP, Search, detached, layer_of, longest_steps
 from .laying import entries
 from .levenberg import Numbers, descend
 from .normal_kernels import add_scene_products
@@ -97,18 +97,18 @@ class SceneProblem:
 
     def numbers(self, search: Search, stays: Callable[[Slot, float], bool]) -> Numbers:
         """Which move, how far in one step, and what keeps them in their range; the ground's where it is opaque."""
-        side = math.sqrt(self.scene.size[0] * self.scene.size[1])
-        free, rates = [], []
+        free, steps = [], []
         for group in self.scene.groups:
             slots = [slot for slot in group.values for _ in range(slot.parameter.width)]
             for row in group.rows().tolist():
                 free += [not stays(slot, value) for slot, value in zip(slots, row, strict=True)]
-                rates += [rate_of(slot.parameter.unit, side, LONGEST_STEP) for slot in slots]
+            steps.append(longest_steps(group.structure, self.scene).repeat(len(group)))
         grounds = min(self.channels, 3) if self.scene.opaque else 0
         free += [True] * grounds
-        rates += [rate_of(BACKGROUND, side, LONGEST_STEP)] * grounds
+        side = math.sqrt(self.scene.size[0] * self.scene.size[1])
+        steps.append(torch.full((grounds,), rate_of(BACKGROUND, side, LONGEST_STEP)))
         moving = torch.tensor(free, dtype=torch.bool).nonzero()[:, 0]
-        return Numbers(moving, torch.tensor(rates)[moving], partial(self._keep, search))
+        return Numbers(moving, torch.cat(steps)[moving], partial(self._keep, search))
 
     def _keep(self, search: Search, row: torch.Tensor) -> None:
         project(self.scene_of(row), search.pixel, search.falloff)

@@ -74,7 +74,7 @@ def add_products(
 ):
     """Σ slope·slope [G, F, F], below the diagonal and on it, and Σ slope·wrong [G, F] by the free numbers.
 
-    `sloped` [step, C · (1 + numbers), pixels] is scratch.
+    `sloped` [step, C · (2 + numbers), pixels] is scratch.
     """
     channels = below.shape[1]
     numbers = sloped.shape[1] // channels - 2

@@ -70,7 +70,8 @@ def grow(
     """The scene after each round that helped, alone or with those before it, until it has as many layers as `most`, is
     near enough, or is helped no more.
     """
-    kept, count, wasted = error_of(scene, sizes.joint), scene.layer_count, 0
+    error = kept = error_of(scene, sizes.joint)
+    count, wasted = scene.layer_count, 0
     while scene.layer_count < most and kept > floor and wasted < (PATIENCE if kept > CLOSE else 1):
         found = _better(_alternatives(scene, sizes, search, most, floor), sizes.joint, HELPS * kept)
         if found is None:
@@ -79,11 +80,11 @@ def grow(
         if now <= HELPS * kept or made.layer_count < count:
             yield Round(made, now, kept)
             kept, count, wasted = now, made.layer_count, 0
-        elif now < error_of(scene, sizes.joint):
+        elif now < error:
             wasted += 1
         else:
             return
-        scene = made
+        scene, error = made, now
 
 
 def _better(made: Iterable[SceneTensors], view: View, enough: float) -> tuple[SceneTensors, float] | None:
@@ -248,7 +249,8 @@ def _carved(scene: SceneTensors, sizes: Sizes, search: Search, floor: float) -> 
         cuts = [cut_from(layer_at(scene, order), around) for order, around in enumerate(places)]
         gains = [_seen_through(*pair) for pair in zip(cuts, places, strict=True)]
         best = max(range(len(gains)), key=gains.__getitem__)
-        cut = search.filled(cuts[best], places[best]) if gains[best] >= THROUGH * error else None
+        place = places[best]
+        cut = search.filled(cuts[best], place, place) if gains[best] >= THROUGH * error else None
         if cut is None:
             return scene
         made = descended(inserted(scene, cut.layer), sizes.joint, search, AFTER)
@@ -267,9 +269,7 @@ def _exchanged(scene: SceneTensors, sizes: Sizes, search: Search) -> SceneTensor
         coarse, fine = (Surroundings.of(scene, order, view) for view in (sizes.search, sizes.joint))
         for index in range(len(layer_at(scene, order).structure)):
             layer = layer_at(scene, order)
-            likely = search.likely(in_place_of(layer, index, coarse), coarse)
-            tried = [search.refined(other.layer, fine) for other in likely]
-            best = min(tried, key=lambda found: found.error, default=None)
+            best = search.filled(in_place_of(layer, index, coarse), coarse, fine)
             if best and best.error < MOVED * fine.error(layer):
                 scene = inserted(scene, best.layer)
     return descended(scene, sizes.joint, search, AFTER)

@@ -5,19 +5,18 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import cast
 
 import numpy as np
 
 from ...grain import Grain
-from ...outlines import EllipseOutline, Outline
+from ...outlines import EllipseOutline
 from ...scene import Color, Layer, Scene
 from ...shapes import KINDS
 from .bezier_fit import smooth_path, straight_path
 from .blur import Blurred
 from .canvas import Canvas
 from .compact import drawn_difference, drawn_figure, figure
-from .display import Drawing, Figure, Group, Item, LinearGradient, Outlines, Path
+from .display import Drawing, Figure, Group, Item, LinearGradient, Path
 from .gradients import SoftEdge, ellipse, radial, sliced
 from .isobands import (
     Band,
@@ -108,13 +107,9 @@ class Painter:
         return self._soft(layer, index, fill)
 
     def _sharp(self, layer: Layer, fill: Color | LinearGradient) -> Item | None:
-        outline = edge_of(layer, 0.5)
+        outline = edge_of(layer, 0.5) or uncrossed(layer, self.plan.canvas)
         if outline is not None:
             return Figure(placed(outline, self.plan.canvas), fill, layer.opacity)
-        outlines = uncrossed(layer, self.plan.canvas)
-        if outlines is not None:
-            each = tuple(cast("Outline", placed(outline, self.plan.canvas)) for outline in outlines)
-            return Figure(Outlines(each), fill, layer.opacity)
         found = layer_contours(layer, [0.5], self.plan.canvas)
         path = smooth_path(found[0].contours, TOLERANCE, self.plan.canvas) if found else NOWHERE
         return Figure(path, fill, layer.opacity)

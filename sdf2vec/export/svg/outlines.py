@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, replace
 from functools import singledispatch
+from typing import cast
 
 import numpy as np
 
@@ -14,7 +15,7 @@ from ...scene import Layer
 from ...shapes import KINDS
 from .bezier_fit import smooth_path
 from .canvas import Canvas, Points, pairs
-from .display import Geometry
+from .display import Geometry, Outlines
 from .sampling import SampleGrid
 
 FLAT = 1e-9  # scene units: a side shorter than this is none
@@ -39,7 +40,7 @@ def edge_of(layer: Layer, falloffs: float) -> Outline | None:
 
 
 @singledispatch
-def placed(outline: Outline | Traced, canvas: Canvas) -> Geometry:
+def placed(outline: Outline | Outlines | Traced, canvas: Canvas) -> Geometry:
     """The outline in user units."""
     raise NotImplementedError(type(outline))
 
@@ -64,6 +65,11 @@ def _(outline: RectangleOutline, canvas: Canvas) -> Geometry:
 @placed.register
 def _(outline: PolygonOutline, canvas: Canvas) -> Geometry:
     return PolygonOutline(pairs(canvas.places(outline.points)), outline.rounding * canvas.unit)
+
+
+@placed.register
+def _(outline: Outlines, canvas: Canvas) -> Geometry:
+    return Outlines(tuple(cast("Outline", placed(each, canvas)) for each in outline.each))
 
 
 @placed.register

@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 
 from ...arrays import Float64Array
-from ...outlines import Outline
 from ...scene import Layer
 from .canvas import Canvas
+from .display import Outlines
 from .isobands import trace_grid
 from .outlines import TOLERANCE, edge_of
 from .sampling import distances
@@ -16,21 +16,20 @@ NEAR = 2.0  # user units, or grid cells where these are larger, around an edge
 MOST = 16  # shapes
 
 
-def uncrossed(layer: Layer, canvas: Canvas) -> tuple[Outline, ...] | None:
-    """The outlines of a sharp layer's shapes where what lies within an odd number of them is the layer; else None.
+def uncrossed(layer: Layer, canvas: Canvas) -> Outlines | None:
+    """The outlines of a sharp layer's shapes in scene units, where what lies within an odd number of them is it.
 
     It is so where all are on the canvas, at no place of a grid two edges are near, the layer's is near where one of
     them is, and it covers what the outlines say.
     """
     shapes = [Layer((shape,), layer.falloff, layer.opacity) for shape in layer.shapes]
-    grid = trace_grid(layer, canvas) if 1 < len(shapes) <= MOST else None
-    outlines = [edge_of(shape, 0.5) for shape in shapes] if grid is not None else []
-    if grid is None or None in outlines:
+    outlines = tuple(outline for shape in shapes if (outline := edge_of(shape, 0.5)) is not None)
+    if len(outlines) < len(shapes) or len(shapes) > MOST or (grid := trace_grid(layer, canvas)) is None:
         return None
     whole, each = distances(layer, grid), np.stack([distances(shape, grid) for shape in shapes])
     near = max(NEAR / canvas.unit, NEAR * grid.step)
     is_same = _is_parity(whole, each, near) and _is_near(whole, each, near, TOLERANCE / canvas.unit)
-    return tuple(outline for outline in outlines if outline is not None) if is_same else None
+    return Outlines(outlines) if is_same else None
 
 
 def _is_parity(whole: Float64Array, each: Float64Array, near: float) -> bool:

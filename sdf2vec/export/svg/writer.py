@@ -249,12 +249,12 @@ class _Writer:
 
     @element.register
     def _(self, geometry: PolygonOutline, look: Attributes) -> Element:
-        points = np.array(geometry.points)
         if self.style.compact:
+            points = np.array(geometry.points)
             turned = (np.roll(points, -first, axis=0) for first in range(len(points)))
             data = min((self._relative(Contour.straight(pairs(corners))) for corners in turned), key=len)
         else:
-            data = self._polygon(points, geometry.rounding)
+            data = self._closed(geometry)
         return self._with(self.svg.path(data), look)
 
     @element.register
@@ -275,17 +275,14 @@ class _Writer:
         """Path data of an outline."""
         made = core(outline)
         if made is not None:
-            return self._polygon(*made)
+            points, rounding = made
+            return f"M{self._joined(points)}Z" if rounding < FLAT else self._rounded(points, rounding)
         assert isinstance(outline, EllipseOutline)
         (x, y), (across, down), angle = outline.center, outline.radii, outline.angle
         along = np.array([math.cos(angle), math.sin(angle)]) * across
         one, other = (self._joined(np.array([[x, y]]) + sign * along) for sign in (-1.0, 1.0))
         arc = f"A{self.number(across)} {self.number(down)} {self.fine(math.degrees(angle) % 180.0)} 0 1 "
         return f"M{one}{arc}{other}{arc}{one}Z"
-
-    def _polygon(self, points: Points, rounding: float) -> str:
-        """Path data of a polygon grown by a rounding."""
-        return f"M{self._joined(points)}Z" if rounding < FLAT else self._rounded(points, rounding)
 
     def _rounded(self, points: Points, rounding: float) -> str:
         """Straight edges moved outwards, joined by arcs."""
