@@ -128,9 +128,13 @@ class _Writer:
         """The attributes of a figure that is in no group."""
         if not self.style.compact:
             return self._painted(figure)
-        assert isinstance(figure.fill, tuple)
-        look: Attributes = {"color": color_text(figure.fill), "opacity": opacity_text(figure.opacity)}
         rounding = rounding_of(figure)
+        look: Attributes = {"opacity": opacity_text(figure.opacity)}
+        paint = self.paint(figure.fill, figure)
+        if isinstance(figure.fill, tuple):
+            look["color"] = paint
+        else:
+            look |= {"fill": paint, "stroke": paint if rounding else None}
         stroke = self.number(2.0 * rounding) if rounding else None
         if figure.blur:
             usual = stroke and rounding == self.roundings.get(figure.blur)
@@ -278,22 +282,29 @@ class _Writer:
             points, rounding = made
             return f"M{self._joined(points)}Z" if rounding < FLAT else self._rounded(points, rounding)
         assert isinstance(outline, EllipseOutline)
-        (x, y), (across, down), angle = outline.center, outline.radii, outline.angle
+        (across, down), angle = outline.radii, outline.angle
+        if across < down:
+            across, down, angle = down, across, angle + math.pi / 2
         along = np.array([math.cos(angle), math.sin(angle)]) * across
-        one, other = (self._joined(np.array([[x, y]]) + sign * along) for sign in (-1.0, 1.0))
-        arc = f"A{self.number(across)} {self.number(down)} {self.fine(math.degrees(angle) % 180.0)} 0 1 "
+        one, other = (self._joined(np.array([outline.center]) + sign * along) for sign in (-1.0, 1.0))
+        radii = " ".join(self.number(self._growing(radius)) for radius in (across, down))
+        arc = f"A{radii} {self.fine(math.degrees(angle) % 180.0)} 0 1 "
         return f"M{one}{arc}{other}{arc}{one}Z"
 
     def _rounded(self, points: Points, rounding: float) -> str:
         """Straight edges moved outwards, joined by arcs."""
         corners = convex(points)
         moved = [(a + n * rounding, b + n * rounding) for a, b, n in sides(corners)] or [(points[0],) * 2]
-        # Half a circle must not be flattened because its ends were rounded towards each other; a small radius grows.
-        least = max(rounding - 10.0**-self.drawing.digits, 0.5 * rounding)
-        radius = self.number(rounding if len(corners) > 2 else least)
+        radius = self.number(rounding if len(corners) > 2 else self._growing(rounding))
         arc = f"A{radius} {radius} 0 0 1 "
         edges = [f"{self._joined(a[None])}L{self._joined(b[None])}" for a, b in moved]
         return f"M{arc.join(edges)}{arc}{self._joined(moved[0][0][None])}Z"
+
+    def _growing(self, radius: float) -> float:
+        """A radius of half a circle that renderers make larger until it reaches from end to end, for one that is too
+        large, as these are rounded towards each other, flattens it.
+        """
+        return max(radius - 10.0**-self.drawing.digits, 0.5 * radius)
 
     def _joined(self, points: Points) -> str:
         return " ".join(f"{self.number(x)} {self.number(y)}" for x, y in points.tolist())

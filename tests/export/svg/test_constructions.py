@@ -225,3 +225,27 @@ def test_holes_are_where_they_are_rendered(require_engine, size):
     off = off_in("resvg", scene, size)
     assert -10 * np.log10(np.square(off).mean()) > 36
     assert abs(float(off.mean())) < 0.5 / 255
+
+
+def ellipse(x, y, radii, angle):
+    return Shape.of("ellipse", ORANGE, center=(x, y), radii=radii, angle=angle)
+
+
+@pytest.mark.parametrize("engine", ["resvg", "cairosvg", "chromium"])
+@pytest.mark.parametrize("digit", range(5))
+def test_rings_are_round_whatever_their_ends_are_rounded_to(engine, digit, require_engine):
+    """Each half is an arc from end to end: one of a radius too large by next to nothing would be flat."""
+    require_engine(engine)
+    off, radius = 0.0002 * digit, 0.3 + 0.00015 * digit
+    rings = [
+        Layer((ellipse(x, off, *outer), ellipse(x, off, *hole)), 0.0, 1.0, (Joint("subtraction"),))
+        for x, outer, hole in (
+            (-0.4 + off, ((radius, radius), 0.0), ((0.1, 0.1), 0.0)),
+            (0.35 + off, ((0.12 + off, radius), 0.4), ((0.15, 0.05), 0.4 + math.pi / 2)),
+        )
+    ]
+    scene = Scene(384, 256, tuple(rings), (0.2, 0.3, 0.4))
+    for size in (None, (576, 384)):
+        error = off_in(engine, scene, size)
+        assert -10 * np.log10(np.square(error).mean()) > 38
+        assert abs(float(error.mean())) < 0.5 / 255
