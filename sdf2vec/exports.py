@@ -28,10 +28,8 @@ if TYPE_CHECKING:
     from .image import Picture
 
 FEW = 32  # sharp layers, of which plain elements with names are small enough
-HARDLY, LITTLE = (
-    0.2,
-    0.5,
-)  # dB that a small drawing may lose of the picture; where none loses less, the finest
+HARDLY, LITTLE = 0.2, 0.5  # dB that a small drawing may lose of the picture: a coarse one, a finer one
+LIKE_RENDER = 42.0  # dB from the render
 LARGER = 0.7  # of a size limit: where the finest small drawing takes more, others take too much
 ABOUT = 1.03  # of a size limit, that a drawing which is still to be fitted may seem to take
 
@@ -150,7 +148,7 @@ class Exports:
         if _is_plain(scene):
             return None
         for grain in USUAL:
-            drawn, most = self._drawn(scene, grain), LITTLE if grain is USUAL[-1] else HARDLY
+            drawn, most = self._drawn(scene, grain), self._most_lost(scene, grain)
             if self._lost_by(scene, drawn) > most:
                 continue
             made = exporter.draw(drawn, options, grain)
@@ -160,6 +158,18 @@ class Exports:
                     made, notes=(f"{exporter.suffix[1:]}: drawn small, {_lost(lost)}", *made.notes)
                 )
         return None
+
+    def _most_lost(self, scene: Scene, grain: Grain) -> float:
+        """How many dB of the picture a small drawing may lose: the finest, as many as one that looks like the render.
+
+        Where contours are traced, more is lost than is counted.
+        """
+        traced = any(len(layer.shapes) > 1 for layer in scene.layers)
+        if grain is USUAL[0] or (traced and grain is not USUAL[-1]):
+            return HARDLY
+        if grain is not USUAL[-1]:
+            return LITTLE
+        return max(LITTLE, 10 * math.log10(1.0 + 10 ** ((self._near(scene) - LIKE_RENDER) / 10)))
 
     def _lost_by(self, scene: Scene, found: Scene, error: float = 0.0) -> float:
         """How many dB of the picture another scene loses whose mean squared error is larger by so much."""

@@ -5,10 +5,7 @@ from __future__ import annotations
 from typing import NamedTuple
 
 from .blend import OVER
-from .layer import is_flat
 from .scene import Scene
-
-KINDS = ("triangle", "box", "circle")  # that a blurred element draws as the render does
 
 
 class Grain(NamedTuple):
@@ -24,18 +21,16 @@ class Grain(NamedTuple):
 
 
 GRAINS = (  # finest first
+    Grain(4096, 20, 255, 100, 0.8),
     Grain(1024, 20, 255, 100, 0.8),
     Grain(512, 12, 255, 20, 0.6),
     Grain(256, 8, 51, 10, 1.0),
     Grain(160, 3, 15, 10, 2.0),
 )
-DENSE = GRAINS[2]  # more shapes of it say more of a picture than fewer finer ones, or yet more coarser ones
-USUAL = GRAINS[1::-1]  # what is tried where no size is asked for, smallest first
+DENSE = GRAINS[3]  # more shapes of it say more of a picture than fewer finer ones, or yet more coarser ones
+USUAL = GRAINS[2::-1]  # what is tried where no size is asked for, smallest first
 
 
 def is_drawable(scene: Scene) -> bool:
-    """Whether all of a scene's layers are single shapes of one colour that a blurred element can draw."""
-    return scene.compositing == OVER and all(
-        len(layer.shapes) == 1 and layer.shapes[0].kind in KINDS and is_flat(layer.structure)
-        for layer in scene.layers
-    )
+    """Whether a blurred element can draw each of a scene's layers."""
+    return scene.compositing == OVER and not any(layer.is_patch for layer in scene.layers)

@@ -112,7 +112,7 @@ def _fitted(
     started = time.process_time()
     fit = {name: value for name, value in options.items() if name != LIMIT}
     scene = api.fit(picture, shapes, **fit)  # type: ignore[arg-type] # "auto", where it can
-    text = str(api.exported(scene, "svg", max_bytes=options.get(LIMIT)).data)
+    text = str(api.exported(scene, "svg", picture=picture, max_bytes=options.get(LIMIT)).data)
     drawing, drawn = measured(text, picture, len(scene.layers), time.process_time() - started)
     return drawing._replace(parameters=parameters_of(scene)), drawn
 

@@ -9,12 +9,13 @@ import numpy as np
 import torch
 
 from ..arrays import Float64Array
-from ..blend import EDGE_DEVIATION
+from ..blend import EDGE_DEVIATION, SUBTRACTION
 from ..clusters import clustered
 from ..grain import Grain
 from ..layer import Slot
 from ..render.tensors import Group, SceneTensors, from_scene, to_scene
 from ..scene import Scene
+from ..shapes import KINDS
 from ..steps import Steps
 from ..units import COLOR, FALLOFF, OPACITY, POSITION
 from .settling import GOING_ON, Kept, Settling, Views, descend
@@ -24,6 +25,12 @@ NARROWEST = (1.1, 1.5)  # pixels: of the narrowest blurs, on which renderers agr
 LEAST_FREE = 1.8  # pixels, from which on softnesses are free
 LEAST = 2.15  # pixels, of a free one: renderers have nothing between it and the narrowest ones
 GROWTH = 1.1  # of a triangle's spread, where its edge moves outwards
+GROWING = (
+    "radius",
+    "radii",
+    "half_size",
+    "corner_radius",
+)  # numbers that a shape is as much larger by; others have corners
 TINY = 1e-12
 
 
@@ -89,21 +96,23 @@ def _soften(tensors: SceneTensors, pixel: float, count: int) -> None:
 
 
 def _grow(group: Group, margin: torch.Tensor, pixel: float) -> None:
-    """Moves the sharp edges of a group's shapes outwards by [G, 1], about, in place."""
-    kind = group.structure[0].kind
-    if kind == "triangle":
-        corners = [group.of(name, 0) for name in "abc"]
-        for corner, moved in zip(corners, _grown(torch.stack(corners, 1), margin).unbind(1), strict=True):
-            corner.copy_(moved)
-    elif kind == "circle":
-        group.of("radius", 0).add_(margin).clamp_(min=pixel)
-    else:
-        group.of("half_size", 0).add_(margin).clamp_(min=pixel)
-        group.of("corner_radius", 0).add_(margin).clamp_(min=0.0)
+    """Moves the sharp edges of a group's shapes by [G, 1], about, so that the layers become larger, in place."""
+    for index, part in enumerate(group.structure):
+        own = -margin if part.join == SUBTRACTION else margin
+        lengths = [slot for slot in group.values if slot.part == index and slot.parameter.name in GROWING]
+        for slot in lengths:
+            group.values[slot].add_(own).clamp_(min=pixel if slot.parameter.positive else 0.0)
+        if not lengths:
+            corners = [
+                slot for slot in group.values if slot.part == index and slot.parameter.unit is POSITION
+            ]
+            places = torch.stack([group.values[slot] for slot in corners], 1)
+            for slot, moved in zip(corners, _grown(places, own).unbind(1), strict=True):
+                group.values[slot].copy_(moved)
 
 
 def _grown(corners: torch.Tensor, margin: torch.Tensor) -> torch.Tensor:
-    """Triangles [G, 3, 2] whose spread along both of their own axes has grown as a strip's of that margin [G, 1]."""
+    """Corners [G, N, 2] whose spread along both of their own axes has grown as a strip's of that margin [G, 1]."""
     middle = corners.mean(1, keepdim=True)
     arms = corners - middle
     variances, axes = torch.linalg.eigh(arms.mT @ arms / 12.0)
@@ -118,27 +127,30 @@ def _grown(corners: torch.Tensor, margin: torch.Tensor) -> torch.Tensor:
 
 def _steps(group: Group, grain: Grain, size: tuple[float, float]) -> dict[Slot, Steps]:
     """What a drawing can say of a group's numbers; all else is written as it is."""
-    middle = torch.tensor(size, dtype=torch.float64) * 0.5
     of_unit = {
-        POSITION: Steps(-middle, 1.0 / grain.units),
         COLOR: Steps(0.0, 1.0 / grain.colors),
         OPACITY: Steps(0.0, 1.0 / grain.opacities, least=1.0),
     }
-    found = {slot: of_unit[slot.parameter.unit] for slot in group.values if slot.parameter.unit in of_unit}
+    radii: list[Slot] = []
+    if _has_outline(group):
+        middle = torch.tensor(size, dtype=torch.float64) * 0.5
+        of_unit[POSITION] = Steps(-middle, 1.0 / grain.units)
+        radii = [slot for slot in group.values if slot.parameter.name == "radius"]
     outer = -0.5 * group.falloff.double()  # a radius is written where coverage is one half
-    radii = {slot: Steps(outer, 1.0 / grain.units, least=1.0) for slot in group.values if _is_radius(slot)}
-    return found | radii
+    found = {slot: of_unit[slot.parameter.unit] for slot in group.values if slot.parameter.unit in of_unit}
+    return found | {slot: Steps(outer, 1.0 / grain.units, least=1.0) for slot in radii}
 
 
-def _is_radius(slot: Slot) -> bool:
-    return slot.parameter.name == "radius"
+def _has_outline(group: Group) -> bool:
+    """Whether what is written are the numbers of a shape, not a contour that is traced."""
+    return len(group.structure) == 1 and KINDS[group.structure[0].kind].outline is not None
 
 
 def _unfold(group: Group, grain: Grain, kept: Kept) -> None:
     """Moves a corner of triangles that have become one upright or level line, of which renderers draw no blur, or
     none with an area, which are not seen without one.
     """
-    if group.structure[0].kind != "triangle":
+    if len(group.structure) > 1 or group.structure[0].kind != "triangle":
         return
     a, b, c = (values for slot, values in kept.items() if slot.parameter.unit is POSITION)
     step = 1.0 / grain.units

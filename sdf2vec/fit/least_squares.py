@@ -44,7 +44,8 @@ def improved(
     if not scene.groups:
         return scene
     problem = SceneProblem(detached(scene), view)
-    numbers = problem.numbers(search, is_simple if simple else lambda slot, value: False)
+    keep = partial(project, pixel=search.pixel, falloff=search.falloff)
+    numbers = problem.numbers(keep, is_simple if simple else lambda slot, value: False)
     row, _ = descend(problem.row(), problem, numbers, steps, search.tick)
     made = detached(problem.scene_of(row))
     enforce_min_thickness(made, search.pixel)
@@ -95,7 +96,7 @@ class SceneProblem:
         ]
         return replace(self.scene, groups=groups, background=ground)
 
-    def numbers(self, search: Search, stays: Callable[[Slot, float], bool]) -> Numbers:
+    def numbers(self, keep: Callable[[SceneTensors], None], stays: Callable[[Slot, float], bool]) -> Numbers:
         """Which move, how far in one step, and what keeps them in their range; the ground's where it is opaque."""
         free, steps = [], []
         for group in self.scene.groups:
@@ -108,10 +109,7 @@ class SceneProblem:
         side = math.sqrt(self.scene.size[0] * self.scene.size[1])
         steps.append(torch.full((grounds,), rate_of(BACKGROUND, side, LONGEST_STEP)))
         moving = torch.tensor(free, dtype=torch.bool).nonzero()[:, 0]
-        return Numbers(moving, torch.cat(steps)[moving], partial(self._keep, search))
-
-    def _keep(self, search: Search, row: torch.Tensor) -> None:
-        project(self.scene_of(row), search.pixel, search.falloff)
+        return Numbers(moving, torch.cat(steps)[moving], lambda row: keep(self.scene_of(row)))
 
     def errors(self, rows: torch.Tensor) -> torch.Tensor:
         """The mean square [1]."""

@@ -60,6 +60,11 @@ class Numbers(NamedTuple):
     longest: torch.Tensor
     project: Callable[[torch.Tensor], None]
 
+    def without(self, fixed: torch.Tensor) -> Numbers:
+        """Those but the ones that are fixed [U]."""
+        moving = ~fixed[self.free]
+        return self._replace(free=self.free[moving], longest=self.longest[moving])
+
 
 def descend(
     rows: torch.Tensor, problem: Problem, numbers: Numbers, steps: int, tick: Callable[[float], None]

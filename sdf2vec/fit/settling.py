@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping, Sequence
-from functools import cache
+from functools import cache, partial
 
 import torch
 
@@ -21,6 +21,9 @@ from ..steps import Steps, StepsOf
 from ..threads import threads_of_its_own
 from .adam import adam_over
 from .constraints import project
+from .joining import detached
+from .least_squares import SceneProblem, count_numbers, is_simple
+from .levenberg import descend as down
 from .losses import objective
 from .presets import MSE, Phase
 from .surroundings import View
@@ -33,13 +36,18 @@ PHASES = (
     Phase("settling", 100, 320, rate=0.09, end_rate=0.04, loss=MSE),
 )
 GOING_ON = PHASES[1:]  # from what has settled more coarsely
+SOLVED = 700  # numbers of layers, at most, that settle by least squares
+SHARES, EACH = (
+    (0.0, 0.2, 0.35, 0.5, 0.6, 0.75, 0.97),
+    6,
+)  # what has settled before so many of these steps
 DUE = {  # from which share of the steps on numbers of a precision settle, and when all have
     "place": (0.0, 0.6),
     "falloff": (0.4, 0.65),
     "opacity": (0.45, 0.75),
     "color": (0.5, 0.97),
 }
-FEW, LARGEST = 5, 2048  # layers: fewer are found exactly, more would take too long
+LARGEST = 2048  # layers: more would take too long
 PARTS = 16  # of the formulas of all sorts of layers: kernels for more take too long to compile
 
 
@@ -76,6 +84,12 @@ class Settling:
         self.mend(self.kept)
         self.hold()
 
+    @property
+    def settled(self) -> torch.Tensor:
+        """Which numbers of the layers' rows [G, U] stay where they are."""
+        free = {slot: torch.full_like(values, math.nan) for slot, values in self.group.values.items()}
+        return ~torch.cat(list((free | self.kept).values()), dim=1).isnan()
+
     @torch.no_grad()
     def hold(self) -> None:
         """Moves what stays back to where it stays."""
@@ -109,14 +123,40 @@ def descend(
 ) -> None:
     """Goes down the difference from a picture while ever more numbers of a scene settle, until all have; in place.
 
-    `frozen`: names of units of which nothing moves. `phases`: PHASES unless told.
+    By least squares where they are few enough. `frozen`: names of units of which nothing moves. `phases`: of Adam,
+    PHASES unless told.
     """
-    parts = sum(len(group.structure) for group in tensors.groups)
-    if FEW <= tensors.layer_count <= LARGEST and parts <= PARTS:
-        with threads_of_its_own():
+    parts = [len(group.structure) for group in tensors.groups]
+    with threads_of_its_own():
+        if 0 < count_numbers(tensors) <= SOLVED and max(parts) <= PARTS:
+            _by_least_squares(tensors, settling, views(PHASES[-1].resolution), scene.pixel, frozen)
+        elif 0 < tensors.layer_count <= LARGEST and sum(parts) <= PARTS:
             _descend(tensors, settling, views, scene.pixel, frozen, phases or PHASES)
     for group in settling:
         group.settle(1.0)
+
+
+def _by_least_squares(
+    tensors: SceneTensors, settling: Sequence[Settling], view: View, pixel: float, frozen: tuple[str, ...]
+) -> None:
+    def stays(slot: Slot, value: float) -> bool:
+        return slot.parameter.unit.name in frozen or is_simple(slot, value)
+
+    for share in SHARES:
+        for group in settling:
+            group.settle(share)
+        problem = SceneProblem(detached(tensors), view)
+        numbers = problem.numbers(partial(project, pixel=pixel), stays).without(_settled_in(settling))
+        if len(numbers.free):
+            row, _ = down(problem.row(), problem, numbers, EACH, lambda error: None)
+            tensors.take(problem.scene_of(row))
+        for group in settling:
+            group.hold()
+
+
+def _settled_in(settling: Sequence[Settling]) -> torch.Tensor:
+    """Which numbers of a scene's row have settled; of the ground's none."""
+    return torch.cat([*(group.settled.flatten() for group in settling), torch.zeros(4, dtype=torch.bool)])
 
 
 def _descend(

@@ -88,6 +88,14 @@ class SceneTensors:
     def shape_count(self) -> int:
         return sum(len(group) * len(group.structure) for group in self.groups)
 
+    @torch.no_grad()
+    def take(self, other: SceneTensors) -> None:
+        """Takes over the numbers of a scene of the same layers, in place."""
+        for group, new in zip(self.groups, other.groups, strict=True):
+            for slot, values in group.values.items():
+                values.copy_(new.values[slot])
+        self.background.copy_(other.background)
+
     @property
     def transparent(self) -> bool:
         """Whether there is no ground."""

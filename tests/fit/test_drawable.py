@@ -90,10 +90,9 @@ def test_triangles_without_an_area_are_unfolded():
 
 def test_what_can_not_be_drawn_small():
     circle = Shape.of("circle", (1, 0, 0), center=(0, 0), radius=0.2)
-    assert is_drawable(Scene(8, 8, (Layer((circle,), 0.1),)))
-    assert not is_drawable(Scene(8, 8, (Layer.union((circle, circle), 0.1, 0.1),)))
+    assert is_drawable(Scene(8, 8, (Layer((circle,), 0.1), Layer.union((circle, circle), 0.1, 0.1))))
     assert not is_drawable(Scene(8, 8, (Layer((circle,), 0.1),), compositing="additive"))
-    assert not is_drawable(random_scene(("ellipse",), layers=1, seed=0, width=8, height=8))
+    assert not is_drawable(random_scene(("gaussian",), layers=1, seed=0, width=8, height=8))
 
 
 def test_no_layers():

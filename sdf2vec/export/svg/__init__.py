@@ -18,15 +18,16 @@ from ...grain import Grain, is_drawable
 from ...scene import Scene
 from ..exported import MARK, Exported
 from ..options import EXACT, FIXED, Accepts, Options
+from .compact import drawn, sketched
 from .display import Drawing
-from .layers import drawing, drawn, sketched
+from .layers import drawing
 from .plan import DETAILS, DETAILS_EXACT, Detail, Planner
 from .writer import Style, written
 
 PORTABLE, INKSCAPE = "portable", "inkscape"
 IN_QUOTES = "!$'()*+,;=:@/?"  # what a URI takes as it is, but for "&", which HTML does not
 ACCEPTED = ("over",)
-SMALLER = "svg: drawn in the smallest form (coarse coordinates, colours, blurs)"
+NEARER = 2  # of the details, which are nearer to the render than small drawings
 CREATED = re.compile(rb"(/CreationDate \(D:)([^)]*)")
 PRODUCER = re.compile(rb"(?<=/Producer \()(cairo [\d.]+) \(https?://cairographics\.org\)(?=\))")
 
@@ -44,14 +45,16 @@ def svg(scene: Scene, options: Options) -> Exported:
 
 
 def svg_forms(scene: Scene, options: Options) -> list[Callable[[], Exported]]:
-    """The same, and ever coarser drawings."""
-    return _forms(scene, options, options.svg_profile)
+    """The same, and ever coarser drawings; none that are worth less than small ones."""
+    return _forms(scene, options, options.svg_profile, NEARER if draws(scene, options) else len(DETAILS))
 
 
-def _forms(scene: Scene, options: Options, profile: str) -> list[Callable[[], Exported]]:
+def _forms(
+    scene: Scene, options: Options, profile: str, count: int = len(DETAILS)
+) -> list[Callable[[], Exported]]:
     planner = _planner(scene, profile)
     finest = [DETAILS_EXACT] if options.svg_fidelity == EXACT else []
-    return [partial(_made, planner, detail, options) for detail in (*finest, *planner.details)]
+    return [partial(_made, planner, detail, options) for detail in (*finest, *DETAILS[:count])]
 
 
 def _made(planner: Planner, detail: Detail, options: Options) -> Exported:
@@ -139,8 +142,7 @@ def _planner(scene: Scene, profile: str) -> Planner:
 
 
 def _text(planner: Planner, detail: Detail, options: Options) -> str:
-    style = _small(detail.grain) if detail.grain else Style(detail.named)
-    return _written(drawing(planner.scene, planner.plan(detail), detail), options, style)
+    return _written(drawing(planner.scene, planner.plan(detail), detail), options, Style(detail.named))
 
 
 def _small(grain: Grain) -> Style:
@@ -153,7 +155,5 @@ def _written(drawing: Drawing, options: Options, style: Style) -> str:
 
 
 def _coarser(detail: Detail) -> str:
-    if detail.grain:
-        return SMALLER
     blurs = f", blurs down to {detail.target:g} dB" if detail.target else ", blurs for all polygons"
     return f"svg: drawn coarser (edges to {detail.levels:g} levels{blurs})"

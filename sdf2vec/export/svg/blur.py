@@ -65,7 +65,7 @@ def best_blur(layer: Layer, canvas: Canvas) -> Blurred | None:
     """The blurred outline nearest to a layer's coverage; None where gradients say it exactly, or nothing is seen."""
     outline = edge_of(layer, 0.5)
     if outline is None:
-        return _traced(layer, canvas)
+        return best_traced(layer, canvas)
     if core(outline) is None:
         return None
     trial = trial_of(layer, canvas)
@@ -79,19 +79,24 @@ def best_blur(layer: Layer, canvas: Canvas) -> Blurred | None:
     return nearest([plain, best, *(trial.judged(*edge, other) for other in others)])
 
 
-def _traced(layer: Layer, canvas: Canvas) -> Blurred | None:
-    """The nearest blur of a contour of a layer that has no outline of its own."""
+def best_traced(layer: Layer, canvas: Canvas, deviations: Sequence[float] | None = None) -> Blurred | None:
+    """The nearest blur of a contour of a layer that has no outline of its own; None where nothing is seen.
+
+    `deviations`: what it may be blurred by, in scene units; without, by about what the falloff asks for, or not at all.
+    """
     trial = trial_of(layer, canvas, *TRACED_CELLS)
     field = distances(layer, trial.grid) - 0.5 * layer.falloff
     edge = trial.wanted * (1.0 - trial.wanted) * trial.seen
     if edge.sum() < 1e-3:
         return None
-    steep = max(
-        float(np.sum(edge * steepness(field, trial.grid.step)) / edge.sum()), 0.1
-    )  # 1 for a true distance
-    tried = (found for width in WIDTHS for found in trial.moved(field / steep, width / steep))
-    plain = Traced(tuple(contours(field, 0.0, trial.grid)))
-    return nearest([*tried, trial.judged(plain, field / steep, 0.0)])
+    # 1 for a true distance
+    steep = max(float(np.sum(edge * steepness(field, trial.grid.step)) / edge.sum()), 0.1)
+    usual = [trial.deviation(width / steep) for width in WIDTHS]
+    tried = [found for deviation in deviations or usual for found in trial.moved(field / steep, deviation)]
+    if deviations is None:
+        plain = Traced(tuple(contours(field, 0.0, trial.grid)))
+        tried.append(trial.judged(plain, field / steep, 0.0))
+    return nearest(tried)
 
 
 def steepness(field: Float64Array, step: float) -> Float64Array:
@@ -116,9 +121,8 @@ class Trial:
     seen: BoolArray  # [Y, X]
     unit: float
 
-    def moved(self, field: Float64Array, width: float) -> Iterator[Blurred]:
+    def moved(self, field: Float64Array, deviation: float) -> Iterator[Blurred]:
         """Contours of a field [Y, X] where it is 0, each nearer to where coverage is one half once it is blurred."""
-        deviation = self.deviation(width)
         for _ in range(MOVES):
             found = self.judged(Traced(tuple(contours(field, 0.0, self.grid))), field, deviation)
             yield found

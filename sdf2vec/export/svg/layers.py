@@ -2,21 +2,18 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ...grain import Grain
 from ...outlines import EllipseOutline
 from ...scene import Color, Layer, Scene
 from ...shapes import KINDS
 from .bezier_fit import smooth_path, straight_path
 from .blur import Blurred
 from .canvas import Canvas
-from .compact import drawn_difference, drawn_figure, figure
-from .display import Drawing, Figure, Group, Item, LinearGradient, Path
+from .display import Drawing, Figure, Group, Item, LinearGradient
 from .gradients import SoftEdge, ellipse, radial, sliced
 from .isobands import (
     Band,
@@ -30,12 +27,11 @@ from .isobands import (
 )
 from .outlines import TOLERANCE, core, edge_of, placed, upright
 from .plan import Detail, Plan
-from .refit_appearance import HASTY, refitted
+from .refit_appearance import refitted
 from .sampling import covers
-from .uncrossed import uncrossed
+from .sharp_edges import NOWHERE, sharp_edge
 from .union_gradient import fill_of, mean_color, ramp_of
 from .union_partition import part_bands
-from .visibility import layers_at
 
 TRANSPARENT_LIFT = 0.5  # 8-bit levels: on no ground browsers lose half of one at a blur
 PARTS_COARSER = 8.0  # the parts of a union are dearer than other bands: every shape has bands of its own
@@ -43,35 +39,17 @@ NARROW = 12.0  # pixels: bands of a softer edge need no antialiasing
 LOOSEST = 1.0  # user units that a contour of a soft edge may be off
 MOST_PARTS = 16  # shapes of a union that have parts of their own; a larger one is painted with a gradient
 MIXED = 7.5  # by so much more than the stops of an edge may a gradient through a union be off
-NOWHERE = Path(())  # of a contour that no place on the canvas reaches
 
 
 def drawing(scene: Scene, plan: Plan, detail: Detail) -> Drawing:
     """The scene as a display list. Only `over`."""
-    grain, canvas = detail.grain, plan.canvas
+    canvas = plan.canvas
     off = {index: blurred.difference for index, blurred in plan.blurred.items()}
     cut = [index for index, layer in enumerate(scene.layers) if plan.is_rounded_down(index, layer)]
-    scene, _ = refitted(scene, plan.samples, off, cut, *((grain.colors, grain.opacities) if grain else ()))
+    scene, _ = refitted(scene, plan.samples, off, cut)
     painter = Painter(plan, detail, 0.0 if scene.opaque else TRANSPARENT_LIFT)
     drawn = [painter.draw(layer, index) for index, layer in enumerate(scene.layers)]
     items = tuple(item for item in drawn if item is not None)
-    return Drawing(canvas.width, canvas.height, canvas.pixels, canvas.digits, scene.background, items)
-
-
-def drawn(scene: Scene, grain: Grain) -> tuple[Drawing, float]:
-    """A scene whose numbers a drawing of this grain can say, as a display list, and how far that is off from its
-    render, in 8-bit levels (root mean square), about.
-    """
-    canvas = Canvas.whole(scene, grain.units)
-    off = {i: drawn_difference(layer, canvas) for i, layer in enumerate(scene.layers) if layer.falloff}
-    scene, error = refitted(scene, layers_at(scene), off, (), grain.colors, grain.opacities, HASTY)
-    return sketched(scene, grain), 255.0 * math.sqrt(error)
-
-
-def sketched(scene: Scene, grain: Grain) -> Drawing:
-    """The same without colours that make up for what blurs do: of about as many bytes."""
-    canvas = Canvas.whole(scene, grain.units)
-    items = tuple(drawn_figure(layer, canvas) for layer in scene.layers)
     return Drawing(canvas.width, canvas.height, canvas.pixels, canvas.digits, scene.background, items)
 
 
@@ -98,8 +76,6 @@ class Painter:
         fill, error = fill_of(layer, canvas, lift)
         if error > MIXED * self.detail.levels and 1 < len(layer.seen) <= MOST_PARTS:
             return self._parts(layer, self.plan.bands[index])
-        if self.detail.grain:
-            return figure(layer, blurred, canvas) if blurred else None
         if not self.plan.soft[index]:
             return self._sharp(layer, fill)
         if blurred:
@@ -107,12 +83,7 @@ class Painter:
         return self._soft(layer, index, fill)
 
     def _sharp(self, layer: Layer, fill: Color | LinearGradient) -> Item | None:
-        outline = edge_of(layer, 0.5) or uncrossed(layer, self.plan.canvas)
-        if outline is not None:
-            return Figure(placed(outline, self.plan.canvas), fill, layer.opacity)
-        found = layer_contours(layer, [0.5], self.plan.canvas)
-        path = smooth_path(found[0].contours, TOLERANCE, self.plan.canvas) if found else NOWHERE
-        return Figure(path, fill, layer.opacity)
+        return Figure(sharp_edge(layer, self.plan.canvas, TOLERANCE), fill, layer.opacity)
 
     def _soft(self, layer: Layer, index: int, fill: Color | LinearGradient) -> Item | None:
         canvas = self.plan.canvas

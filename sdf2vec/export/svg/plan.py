@@ -3,18 +3,16 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
 
 import numpy as np
 
 from ...arrays import Float64Array
-from ...grain import GRAINS, Grain, is_drawable
 from ...scene import Layer, Scene
 from .blur import Blurred, best_blur
 from .canvas import Canvas
-from .compact import compact_blurs
 from .gradient_stops import stop_count
 from .isobands import band_count
 from .outlines import edge_of
@@ -33,14 +31,12 @@ class Detail:
 
     `levels`: the error, in 8-bit levels, that the stops of one shape's edge may leave, and times
     BANDS_COARSER the bands of a traced one. `coarser`: decimals fewer. `named`: names on shapes.
-    `grain`: nothing but blurs, in the smallest text, so coarse.
     """
 
     target: float = 47.0
     levels: float = 0.2
     coarser: int = 0
     named: bool = True
-    grain: Grain | None = None
 
 
 DETAILS_EXACT = Detail(target=math.inf, levels=0.1)  # no blurs
@@ -53,7 +49,6 @@ DETAILS = (
     Detail(target=34.0, levels=1.2, coarser=1),
     Detail(target=30.0, levels=2.0, coarser=1, named=False),
     Detail(target=0.0, levels=4.0, coarser=1, named=False),
-    *(Detail(target=0.0, levels=4.0, named=False, grain=grain) for grain in GRAINS),
 )
 
 
@@ -111,30 +106,13 @@ class Planner:
     @cached_property
     def blurs(self) -> dict[int, Blurred]:
         """The nearest blur of each soft layer."""
-        return self._blurs([index for index, soft in enumerate(self.soft) if soft])
-
-    @cached_property
-    def traced(self) -> dict[int, Blurred]:
-        """The nearest contour of each sharp layer that has no outline of its own."""
-        sharp = (
-            (i, layer) for i, layer in enumerate(self.scene.layers) if not (self.soft[i] or layer.is_patch)
-        )
-        return self._blurs([index for index, layer in sharp if edge_of(layer, 0.5) is None])
-
-    def _blurs(self, indices: Sequence[int]) -> dict[int, Blurred]:
-        tried = {index: best_blur(self.scene.layers[index], self.canvas) for index in indices}
+        layers = enumerate(self.scene.layers)
+        tried = {i: best_blur(layer, self.canvas) for i, layer in layers if self.soft[i]}
         return {index: blurred for index, blurred in tried.items() if blurred is not None}
-
-    @property
-    def details(self) -> list[Detail]:
-        """The details that a drawing may have, finest first; small ones of what is drawable are fitted (`drawn`)."""
-        patches = any(layer.is_patch for layer in self.scene.layers)
-        compact = self.can_be_small and not patches and not is_drawable(self.scene)
-        return [detail for detail in DETAILS if compact or not detail.grain]
 
     def plan(self, detail: Detail) -> Plan:
         """The cheapest constructions that keep to what is allowed."""
-        scene, grain = self.scene, detail.grain
+        scene = self.scene
         stops = [stop_count(weight, detail.levels) for weight in self.weights.tolist()]
         side = max(self.canvas.unit, SHOWN)
         bands = [
@@ -143,16 +121,10 @@ class Planner:
             )
             for weight, layer in zip(self.weights.tolist(), scene.layers, strict=True)
         ]
-        if grain:
-            canvas = Canvas.whole(scene, grain.units)
-            blurred = compact_blurs(scene, self.soft, self.blurs | self.traced, grain, canvas)
-        else:
-            canvas = Canvas.of(scene, detail.coarser)
-            blurred = self._near_enough(detail.target) if self.filters else {}
         return Plan(
-            canvas,
+            Canvas.of(scene, detail.coarser),
             self.soft,
-            blurred,
+            self._near_enough(detail.target) if self.filters else {},
             stops,
             bands,
             self.filters and self.is_crisp,

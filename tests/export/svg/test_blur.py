@@ -101,5 +101,5 @@ def test_a_traced_contour_moves_to_where_its_blur_is_one_half():
     numbers: Parameters = {"center": (0, 0), "radius": 0.1, "amplitude": 0.03, "frequency": (9, 8)}
     layer = Layer((Shape.of("displaced", (1, 1, 1), **numbers),), 0.15)
     trial = trial_of(layer, Canvas.of(Scene(300, 220, (layer,), None)), 128, 128)
-    still, *moved = trial.moved(distances(layer, trial.grid) - 0.075, 1.0)
+    still, *moved = trial.moved(distances(layer, trial.grid) - 0.075, trial.deviation(1.0))
     assert moved[-1].error < 0.7 * still.error

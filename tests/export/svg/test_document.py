@@ -114,7 +114,7 @@ def test_a_size_limit_is_kept_or_refused():
     limited = exported(scene, "svg", max_bytes=free // 2)
     assert limited.met
     assert len(limited.raw) <= free // 2
-    assert any("drawn coarser" in note for note in limited.notes)
+    assert any("drawn small" in note for note in limited.notes)
     with pytest.raises(Sdf2vecError, match=r"^svg: [\d,]+ bytes at least, more than the limit of 500 bytes"):
         export(scene, "svg", max_bytes=500)
     assert not exported(scene, "svg", max_bytes=40 * 170, svg_profile="portable").met

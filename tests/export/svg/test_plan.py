@@ -10,7 +10,6 @@ from sdf2vec.export.svg.plan import DETAILS, Planner
 ELLIPSE = Shape.of("ellipse", (1, 0, 0), center=(0, 0), radii=(0.3, 0.2), angle=0)
 DISC = Shape.of("circle", (1, 1, 1), center=(0, 0), radius=0.3)
 BOX = Shape.of("box", (0.25, 0.25, 0.25), center=(0, 0), half_size=(0.3, 0.1), angle=0.5, corner_radius=0.0)
-PATCH = Shape.of("gaussian", (1, 0, 0), center=(0, 0), radii=(0.2, 0.1), angle=0.0)
 
 
 def planner(*layers, filters=True, side=200):
@@ -40,16 +39,13 @@ def test_a_target_that_no_blur_reaches_leaves_none():
 
 def test_coarser_details_have_no_more_stops_and_bands():
     made = planner(Layer((DISC,), 0.2), Layer((BOX,), 0.2))
-    plans = [made.plan(detail) for detail in made.details]
+    plans = [made.plan(detail) for detail in DETAILS]
     for finer, coarser in pairwise(plans):
         assert all(a >= b for a, b in zip(finer.stops, coarser.stops, strict=True))
         assert all(a >= b for a, b in zip(finer.bands, coarser.bands, strict=True))
 
 
-def test_only_what_can_be_blurred_has_a_smallest_drawing():
-    """But for shapes whose small drawing is fitted."""
-    assert planner(Layer((ELLIPSE,), 0.2)).details == list(DETAILS)
-    assert planner(Layer((DISC,), 0.2)).details == planner(Layer((PATCH,), 0.0)).details
-    assert planner(Layer((ELLIPSE,), 0.2), filters=False).details == planner(Layer((PATCH,), 0.0)).details
-    assert not any(detail.grain for detail in planner(Layer((PATCH,), 0.0)).details)
-    assert planner(Layer((ELLIPSE,), 0.0), filters=False).details == list(DETAILS)
+def test_only_what_can_be_blurred_has_a_small_drawing():
+    assert planner(Layer((ELLIPSE,), 0.2)).can_be_small
+    assert not planner(Layer((ELLIPSE,), 0.2), filters=False).can_be_small
+    assert planner(Layer((ELLIPSE,), 0.0), filters=False).can_be_small

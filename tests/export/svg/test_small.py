@@ -1,12 +1,13 @@
 """Small drawings of scenes whose numbers they can say, and when one is chosen."""
 
 import gzip
+from dataclasses import replace
 from xml.etree import ElementTree
 
 import numpy as np
 import pytest
 
-from sdf2vec import export, exported, fit
+from sdf2vec import Layer, Scene, Shape, export, exported, fit
 from sdf2vec.engines import ENGINES
 from sdf2vec.export.options import Options
 from sdf2vec.export.svg import small_svg
@@ -15,8 +16,10 @@ from sdf2vec.grain import GRAINS
 from sdf2vec.image import load, premultiply
 from sdf2vec.quality import psnr_of
 from sdf2vec.render.draw import draw
+from sdf2vec.scene import Joint
 from tests.export.svg.drawings import NAMESPACE
 from tests.fit.test_drawable import of_kinds
+from tests.scenes import random_scene
 
 
 @pytest.fixture(scope="module")
@@ -30,6 +33,20 @@ def picture():
 @pytest.fixture(scope="module")
 def scene(picture):
     return fit(picture, 12, preset="fast", kind="triangle")
+
+
+def joined(**size):
+    """Layers that have no outline of their own, or are painted."""
+    joined = random_scene(("circle", "triangle", "box"), layers=6, seed=3, paints=("flat",)).layers
+    layers = [
+        *random_scene(("displaced", "ellipse"), layers=4, seed=1, paints=("flat",), joins=()).layers,
+        *random_scene(("box", "triangle"), layers=4, seed=2, paints=("linear",), joins=()).layers,
+        *(replace(layer, falloff=falloff) for layer in joined[2::3] for falloff in (0.0, 0.1)),
+    ]
+    disc = Shape.of("circle", (0.9, 0.8, 0.1), center=(0.3, 0.1), radius=0.3)
+    hole = Shape.of("ellipse", (0, 0, 0), center=(0.35, 0.12), radii=(0.1, 0.15), angle=0.5)
+    ring = Layer((disc, hole), 0.0, 1.0, (Joint("subtraction", 0.0),))
+    return Scene(layers=(*layers, ring), background=(0.5, 0.5, 0.5), **size)
 
 
 def drawn_by(engine, text, width, height):
@@ -48,6 +65,21 @@ def test_it_is_drawn_as_it_was_fitted(engine, grain, require_engine):
         off = drawn_by(engine, text, width, height) - wanted
         assert -10 * np.log10(np.mean(off**2)) > 30
         assert abs(255 * off.mean()) < 1.5
+
+
+@pytest.mark.parametrize("engine", ["resvg", "chromium"])
+@pytest.mark.parametrize("grain", GRAINS[:3], ids=lambda grain: str(grain.units))
+def test_so_are_layers_of_several_shapes_and_gradients(engine, grain, require_engine):
+    """Ellipses, displaced circles, unions, cut-outs and a ring, sharp and soft; and paints."""
+    require_engine(engine)
+    scene = rounded(joined(width=150, height=100), grain)
+    text = str(small_svg(scene, Options(), grain).data)
+    assert "Gradient" in text
+    for size in ((150, 100), (330, 220)):
+        wanted = draw(scene, *size).permute(1, 2, 0).numpy()[..., :3]
+        off = drawn_by(engine, text, *size) - wanted
+        assert -10 * np.log10(np.mean(off**2)) > 32
+        assert abs(255 * off.mean()) < 1.0
 
 
 def test_the_picture_decides(scene, picture):

@@ -1,4 +1,7 @@
-"""Joined shapes whose edges nowhere cross, such as a ring: their own outlines make up the layer's edge."""
+"""Where a layer's coverage is one half, as one geometry.
+
+Of joined shapes whose edges nowhere cross, such as a ring, their own outlines make it up; other edges are traced.
+"""
 
 from __future__ import annotations
 
@@ -6,14 +9,25 @@ import numpy as np
 
 from ...arrays import Float64Array
 from ...scene import Layer
+from .bezier_fit import smooth_path
 from .canvas import Canvas
-from .display import Outlines
-from .isobands import trace_grid
-from .outlines import TOLERANCE, edge_of
+from .display import Geometry, Outlines, Path
+from .isobands import layer_contours, trace_grid
+from .outlines import TOLERANCE, edge_of, placed
 from .sampling import distances
 
 NEAR = 2.0  # user units, or grid cells where these are larger, around an edge
 MOST = 16  # shapes
+NOWHERE = Path(())  # of a contour that no place on the canvas reaches
+
+
+def sharp_edge(layer: Layer, canvas: Canvas, tolerance: float) -> Geometry:
+    """The edge of a layer in user units, of which a traced one may be so many off."""
+    outline = edge_of(layer, 0.5) or uncrossed(layer, canvas)
+    if outline is not None:
+        return placed(outline, canvas)
+    found = layer_contours(layer, [0.5], canvas)
+    return smooth_path(found[0].contours, tolerance, canvas) if found else NOWHERE
 
 
 def uncrossed(layer: Layer, canvas: Canvas) -> Outlines | None:
