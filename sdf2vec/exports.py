@@ -27,7 +27,7 @@ if TYPE_CHECKING:
     from .fit.settling import Views
     from .image import Picture
 
-FEW = 32  # sharp layers, of which plain elements with names are small enough
+FEW = 32  # sharp shapes, of which plain elements with names are small enough
 HARDLY, LITTLE = 0.2, 0.5  # dB that a small drawing may lose of the picture: a coarse one, a finer one
 LIKE_RENDER = 42.0  # dB from the render
 LARGER = 0.7  # of a size limit: where the finest small drawing takes more, others take too much
@@ -160,15 +160,9 @@ class Exports:
         return None
 
     def _most_lost(self, scene: Scene, grain: Grain) -> float:
-        """How many dB of the picture a small drawing may lose: the finest, as many as one that looks like the render.
-
-        Where contours are traced, more is lost than is counted.
-        """
-        traced = any(len(layer.shapes) > 1 for layer in scene.layers)
-        if grain is USUAL[0] or (traced and grain is not USUAL[-1]):
-            return HARDLY
+        """How many dB of the picture a small drawing may lose: the finest, as many as one like the render."""
         if grain is not USUAL[-1]:
-            return LITTLE
+            return HARDLY if grain is USUAL[0] else LITTLE
         return max(LITTLE, 10 * math.log10(1.0 + 10 ** ((self._near(scene) - LIKE_RENDER) / 10)))
 
     def _lost_by(self, scene: Scene, found: Scene, error: float = 0.0) -> float:
@@ -301,7 +295,9 @@ class Exports:
 
 def _is_plain(scene: Scene) -> bool:
     """Whether an SVG of plain elements, with names, is small enough."""
-    return len(scene.layers) <= FEW and not any(layer.falloff for layer in scene.layers)
+    return len(scene.layers) <= FEW and not any(
+        layer.falloff or len(layer.shapes) > 1 for layer in scene.layers
+    )
 
 
 def _lost(decibels: float) -> str:

@@ -18,15 +18,20 @@ from ...outlines import EllipseOutline, Outline, PolygonOutline
 from ...scene import Layer, Scene
 from .blur import best_traced, trial_of
 from .canvas import Canvas, pairs
-from .display import Drawing, Figure, Geometry
+from .display import Drawing, Figure, Geometry, Path
 from .outlines import Traced, core, distance_to, edge_of, placed
 from .refit_appearance import HASTY, Difference, refitted
 from .sampling import distances
 from .sharp_edges import NOWHERE, sharp_edge
 from .union_gradient import fill_of
-from .visibility import LayerSamples, layers_at, showing
+from .visibility import LayerSamples, contrasts, layers_at, showing
 
-TOLERANCE = 0.5  # user units that a traced contour may be off
+TOLERANCE = (
+    0.5,
+    0.15,
+)  # user units or, if that is more, pixels of the fitted picture that a traced contour may be off
+STRAYED = 0.2  # of a contour's tolerance, that curves are off: the root of the mean square
+ROUNDED = 1.0 / 12.0  # mean squared change of a number that is rounded to a whole one
 
 
 def drawn(scene: Scene, grain: Grain) -> tuple[Drawing, float]:
@@ -35,10 +40,11 @@ def drawn(scene: Scene, grain: Grain) -> tuple[Drawing, float]:
     """
     canvas, samples = Canvas.whole(scene, grain.units), layers_at(scene)
     made = [_blurred(layer, canvas) for layer in scene.layers]
+    geometries = [geometry for geometry, _ in made]
     off = {index: difference for index, (_, difference) in enumerate(made) if difference is not None}
     again, error = refitted(scene, samples, off, (), grain.colors, grain.opacities, HASTY)
-    error += _mixed(scene, samples, canvas)
-    return _drawing(again, [geometry for geometry, _ in made], canvas), 255.0 * math.sqrt(error)
+    error += _mixed(scene, samples, canvas) + _moved(scene, samples, geometries, canvas)
+    return _drawing(again, geometries, canvas), 255.0 * math.sqrt(error)
 
 
 def sketched(scene: Scene, grain: Grain) -> Drawing:
@@ -49,7 +55,12 @@ def sketched(scene: Scene, grain: Grain) -> Drawing:
 
 def _drawing(scene: Scene, geometries: Sequence[Geometry], canvas: Canvas) -> Drawing:
     items = (
-        Figure(geometry, fill_of(layer, canvas).fill, layer.opacity, _deviation(layer) * canvas.unit)
+        Figure(
+            _rounded(geometry, canvas),
+            fill_of(layer, canvas).fill,
+            layer.opacity,
+            _deviation(layer) * canvas.unit,
+        )
         for layer, geometry in zip(scene.layers, geometries, strict=True)
         if geometry != NOWHERE
     )
@@ -71,13 +82,42 @@ def _mixed(scene: Scene, samples: LayerSamples, canvas: Canvas) -> float:
     return float(shown @ np.square(errors))
 
 
+def _moved(scene: Scene, samples: LayerSamples, geometries: Sequence[Geometry], canvas: Canvas) -> float:
+    """The mean squared error of edges that are not quite where they should be, about.
+
+    An edge of a length that is moved by a little changes so many pixels by as much as it is moved.
+    """
+    moved = np.array([_squared_move(geometry, canvas) for geometry in geometries]) / canvas.unit**2
+    if not moved.any():
+        return 0.0
+    covers, step = samples.covers.reshape(-1, samples.height, samples.width), scene.extent[0] / samples.width
+    down, across = (np.diff(covers, axis=axis, append=0.0) for axis in (1, 2))
+    lengths = np.hypot(down, across).sum(axis=(1, 2)) * step
+    widths = np.array([max(scene.pixel, layer.falloff) for layer in scene.layers])
+    shown = contrasts(scene, samples) * lengths * moved / widths
+    return float(shown.sum() / (scene.extent[0] * scene.extent[1]))
+
+
+def _squared_move(geometry: Geometry, canvas: Canvas) -> float:
+    """By how much an edge is moved when it is written, in user units: the mean square."""
+    if isinstance(geometry, Path):
+        return (STRAYED * _tolerance(canvas)) ** 2 + ROUNDED
+    if isinstance(geometry, PolygonOutline):
+        numbers = np.array(geometry.points)
+    elif isinstance(geometry, EllipseOutline):
+        numbers = np.array([*geometry.center, *geometry.radii])
+    else:
+        return ROUNDED
+    return float(np.mean(np.square(canvas.rounded(numbers) - numbers)))
+
+
 # --- geometry -------------------------------------------------------------------------------------------------
 
 
 def _edge(layer: Layer, canvas: Canvas) -> Geometry:
     """Where coverage is one half."""
     outline = edge_of(layer, 0.5)
-    return sharp_edge(layer, canvas, TOLERANCE) if outline is None else _whole(outline, canvas)
+    return sharp_edge(layer, canvas, _tolerance(canvas)) if outline is None else _whole(outline, canvas)
 
 
 def _blurred(layer: Layer, canvas: Canvas) -> tuple[Geometry, Difference | None]:
@@ -101,14 +141,27 @@ def _traced(layer: Layer, canvas: Canvas) -> tuple[Geometry, Difference | None]:
     if best is None:
         return NOWHERE, None
     assert isinstance(best.outline, Traced)
-    return placed(Traced(best.outline.contours, TOLERANCE), canvas), best.difference
+    return placed(Traced(best.outline.contours, _tolerance(canvas)), canvas), best.difference
+
+
+def _tolerance(canvas: Canvas) -> float:
+    """How many user units a traced contour may be off."""
+    units, pixels = TOLERANCE
+    return max(units, pixels / canvas.pixels)
 
 
 def _whole(outline: Outline, canvas: Canvas) -> Geometry:
-    """An outline in user units: corners on whole ones, radii of one unit or more."""
+    """An outline in user units, of a polygon and a rounding or an ellipse with radii of one unit or more."""
     if (made := core(outline)) is not None:
         points, rounding = made
-        return PolygonOutline(pairs(canvas.rounded(canvas.places(points))), rounding * canvas.unit)
+        return PolygonOutline(pairs(canvas.places(points)), rounding * canvas.unit)
     geometry = placed(outline, canvas)
     assert isinstance(geometry, EllipseOutline)
     return replace(geometry, radii=(max(geometry.radii[0], 1.0), max(geometry.radii[1], 1.0)))
+
+
+def _rounded(geometry: Geometry, canvas: Canvas) -> Geometry:
+    """Corners as they will be written; the writer rounds other numbers."""
+    if not isinstance(geometry, PolygonOutline):
+        return geometry
+    return replace(geometry, points=pairs(canvas.rounded(np.array(geometry.points))))

@@ -82,6 +82,19 @@ def test_so_are_layers_of_several_shapes_and_gradients(engine, grain, require_en
         assert abs(255 * off.mean()) < 1.0
 
 
+@pytest.mark.parametrize("units", [512, 1024])
+def test_how_far_it_is_off_is_told(units, require_engine):
+    """Sharp edges, of which some are not on the grid: boxes, contours, ellipses. Never told as less than half of it."""
+    require_engine("resvg")
+    (grain,) = (grain for grain in GRAINS if grain.units == units)
+    layers = tuple(replace(layer, falloff=0.0) for layer in joined(width=384, height=256).layers)
+    scene = rounded(Scene(384, 256, layers, (0.5, 0.5, 0.5)), grain)
+    made = small_svg(scene, Options(), grain)
+    wanted = draw(scene, 384, 256).permute(1, 2, 0).numpy()[..., :3]
+    off = 255.0 * np.sqrt(np.mean((drawn_by("resvg", str(made.data), 384, 256) - wanted) ** 2))
+    assert 0.5 * off < made.error < 2.5 * off
+
+
 def test_the_picture_decides(scene, picture):
     """Of a fit whose picture is given a small drawing, which loses hardly anything of it; else one like the render."""
     small, like_render = exported(scene, "svg", picture=picture), exported(scene, "svg")
