@@ -29,7 +29,7 @@ if TYPE_CHECKING:
 
 FEW = 32  # sharp shapes, of which plain elements with names are small enough
 HARDLY, LITTLE = 0.2, 0.5  # dB that a small drawing may lose of the picture: a coarse one, a finer one
-LIKE_RENDER = 42.0  # dB from the render
+LIKE_RENDER, SAME = 42.0, 99.0  # dB from the render; dB of what is the same
 LARGER = 0.7  # of a size limit: where the finest small drawing takes more, others take too much
 ABOUT = 1.03  # of a size limit, that a drawing which is still to be fitted may seem to take
 
@@ -145,7 +145,7 @@ class Exports:
         wanted = options.svg_fidelity == PICTURE and self.picture is not None
         if not wanted or not (exporter.draw and exporter.draws(scene, options)):
             return None
-        if _is_plain(scene):
+        if _is_plain(scene) or (_mixes_colors(scene) and self._loses_more(exporter, scene, options)):
             return None
         for grain in USUAL:
             drawn, most = self._drawn(scene, grain), self._most_lost(scene, grain)
@@ -154,10 +154,17 @@ class Exports:
             made = exporter.draw(drawn, options, grain)
             lost = self._lost_by(scene, drawn, (made.error / 255) ** 2)
             if lost <= most:
-                return replace(
-                    made, notes=(f"{exporter.suffix[1:]}: drawn small, {_lost(lost)}", *made.notes)
+                told = (
+                    _lost(lost) if lost <= LITTLE else f"{self._near(scene) - lost:.1f} dB from the picture"
                 )
+                return replace(made, notes=(f"{exporter.suffix[1:]}: drawn small, {told}", *made.notes))
         return None
+
+    def _loses_more(self, exporter: Exporter, scene: Scene, options: Options) -> bool:
+        """Whether the finest small drawing loses more than it may, which no fit would mend."""
+        assert exporter.draw is not None
+        made = exporter.draw(_rounded(scene, USUAL[-1]), options, USUAL[-1])
+        return self._lost_by(scene, scene, (made.error / 255) ** 2) > self._most_lost(scene, USUAL[-1])
 
     def _most_lost(self, scene: Scene, grain: Grain) -> float:
         """How many dB of the picture a small drawing may lose: the finest, as many as one like the render."""
@@ -290,7 +297,7 @@ class Exports:
 
     def _psnr(self, scene: Scene) -> float:
         """How near a scene is to the picture, in dB."""
-        return _psnr_of(scene, self._shown)
+        return min(_psnr_of(scene, self._shown), SAME)
 
 
 def _is_plain(scene: Scene) -> bool:
@@ -298,6 +305,11 @@ def _is_plain(scene: Scene) -> bool:
     return len(scene.layers) <= FEW and not any(
         layer.falloff or len(layer.shapes) > 1 for layer in scene.layers
     )
+
+
+def _mixes_colors(scene: Scene) -> bool:
+    """Whether there are unions of several colours, which a drawing may not have the fill for."""
+    return any(len({shape.color for shape in layer.seen}) > 1 for layer in scene.layers)
 
 
 def _lost(decibels: float) -> str:

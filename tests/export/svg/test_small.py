@@ -106,6 +106,16 @@ def test_the_picture_decides(scene, picture):
         assert "drawn small" not in str(exported(scene, "svg", picture=picture, svg_fidelity=fidelity).notes)
 
 
+def test_a_union_that_no_gradient_fills_is_drawn_like_the_render():
+    colors, places = ((1, 0, 0), (0, 1, 0), (0, 0, 1)), ((-0.2, 0), (0.2, 0), (0, 0.3))
+    discs = [Shape.of("circle", c, center=p, radius=0.25) for c, p in zip(colors, places, strict=True)]
+    scene = Scene(150, 100, (Layer.union(discs, 0.05, 0.05),), (0.5, 0.5, 0.5))
+    shown = draw(scene, 150, 100).permute(1, 2, 0).numpy()[..., :3]
+    assert not exported(scene, "svg", picture=shown).notes
+    same = replace(scene.layers[0], shapes=tuple(replace(disc, color=(1, 0, 0)) for disc in discs))
+    assert "drawn small" in str(exported(replace(scene, layers=(same,)), "svg", picture=shown).notes)
+
+
 def test_little_of_the_picture_is_lost(scene, picture, require_engine):
     require_engine("resvg")
     text = str(export(scene, "svg", picture=picture))
