@@ -83,12 +83,14 @@ class Slot(NamedTuple):
         return "" if self.part is None else f"_{self.part}"
 
 
+@cache
 def slots(structure: Structure) -> tuple[Slot, ...]:
     """What a layer's row of numbers holds, in order: opacity, falloff, then each part's smoothness, paint, shape."""
     own = (Slot(index, parameter) for index, part in enumerate(structure) for parameter in part.parameters)
     return (*(Slot(None, parameter) for parameter in LOOK), *own)
 
 
+@cache
 def row_width(structure: Structure) -> int:
     """How many numbers a layer's row has."""
     return sum(slot.parameter.width for slot in slots(structure))

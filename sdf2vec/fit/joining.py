@@ -10,7 +10,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
-from functools import partial
+from functools import cache, partial
 
 import torch
 
@@ -291,5 +291,11 @@ def longest_steps(structure: Structure, scene: SceneTensors) -> torch.Tensor:
 
 def layer_of(structure: Structure, order: torch.Tensor, rows: torch.Tensor) -> Group:
     """Layers of a structure from their rows [G, U]."""
-    parts = rows.split([slot.parameter.width for slot in slots(structure)], dim=1)
+    parts = rows.split(_widths(structure), dim=1)
     return Group(structure, order[:1].expand(len(rows)), dict(zip(slots(structure), parts, strict=True)))
+
+
+@cache
+def _widths(structure: Structure) -> list[int]:
+    """How many numbers each slot has."""
+    return [slot.parameter.width for slot in slots(structure)]
