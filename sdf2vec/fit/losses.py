@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from functools import partial
 
 import torch
 
 from ..flip import SMOOTH, appearance, error
-from ..metrics import mse, ssim
+from ..metrics import ssim
 from .presets import Loss
 
 Objective = Callable[[torch.Tensor], torch.Tensor]
@@ -17,12 +16,20 @@ LossMaker = Callable[[torch.Tensor], Objective]
 
 def l1(target: torch.Tensor) -> Objective:
     """Mean absolute difference."""
-    return lambda render: (render - target).abs().mean()
+    return lambda render: _on_grounds(render - target).abs().mean()
 
 
 def squared(target: torch.Tensor) -> Objective:
     """Mean squared difference."""
-    return partial(mse, target)
+    return lambda render: _on_grounds(render - target).square().mean()
+
+
+def _on_grounds(wrong: torch.Tensor) -> torch.Tensor:
+    """A difference [C, H, W], of premultiplied RGBA on black and on white [6, H, W].
+
+    Else black would be laid where nothing should be: on black it is not seen.
+    """
+    return wrong if len(wrong) < 4 else torch.cat([wrong[:3], wrong[:3] - wrong[3:]])
 
 
 def dissimilarity(target: torch.Tensor) -> Objective:

@@ -76,6 +76,16 @@ def test_a_backends_losses_take_the_place_of_those_of_their_names():
     assert float(found(target)) == 6.0
 
 
+def test_where_nothing_should_be_black_is_as_wrong_as_white():
+    """On black, opaque black is not seen; on white it is 1 off. A grey is off on both."""
+    nothing = torch.zeros(4, 2, 2)
+    black, white, grey = (torch.tensor([c, c, c, 1.0])[:, None, None].expand(4, 2, 2) for c in (0, 1, 0.8))
+    for loss, wanted in (("l1", 0.5), ("mse", 0.5)):
+        measure = losses.LOSSES[loss](nothing)
+        assert float(measure(black)) == float(measure(white)) == pytest.approx(wanted)
+    assert float(losses.LOSSES["mse"](nothing)(grey)) == pytest.approx((0.8**2 + 0.2**2) / 2)
+
+
 def test_the_same_seed_gives_the_same_scene_and_another_another():
     scenes = [fit_picture(picture(), Settings(5, tuple(KINDS), preset="fast", seed=s)) for s in (1, 1, 2)]
     assert scenes[0] == scenes[1] != scenes[2]
