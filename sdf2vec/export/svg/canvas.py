@@ -12,14 +12,15 @@ from ...outlines import Point
 from ...scene import Scene
 
 Points = Float64Array  # [N, 2]
+FEW = 32  # sharp layers, whose edges are the drawing: long ones show where they are by a fiftieth of a pixel
 
 
 @dataclass(frozen=True)
 class Canvas:
     """A canvas of `width` × `height` user units, `unit` of them in a scene unit, `pixels` of the fitted picture in one.
 
-    Coordinates get `digits` decimals: a twentieth of a pixel for a picture of 512, more for a smaller one,
-    because a drawing is shown at any size.
+    Coordinates get `digits` decimals: a twentieth of a pixel for a picture of 512, more for a smaller one and for few
+    sharp layers, because a drawing is shown at any size.
     """
 
     width: float
@@ -30,9 +31,10 @@ class Canvas:
 
     @classmethod
     def of(cls, scene: Scene, coarser: int = 0) -> Canvas:
-        """The canvas of a scene in pixels, with some decimals fewer than usual."""
+        """The canvas of a scene in pixels, with some decimals fewer than usual; of few sharp layers, with one more."""
         unit = float(min(scene.width, scene.height))
-        digits = max(0, math.ceil(3.4 - math.log10(unit)), 1) - coarser
+        plain = 0 < len(scene.layers) <= FEW and not any(layer.falloff for layer in scene.layers)
+        digits = max(0, math.ceil(3.4 - math.log10(unit)), 1) + plain - coarser
         return cls(scene.width, scene.height, unit, max(0, digits))
 
     @classmethod

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from sdf2vec import Scene
+from sdf2vec import Layer, Scene, Shape
 from sdf2vec.export.svg.canvas import Canvas, pairs
 
 
@@ -23,6 +23,12 @@ def test_decimals_follow_the_size(side, coarser, digits):
     assert canvas.rounded(np.array([[1 / 3, 2 / 3]])).tolist() == [
         [round(1 / 3, digits), round(2 / 3, digits)]
     ]
+
+
+@pytest.mark.parametrize(("falloff", "count", "digits"), [(0.0, 32, 2), (0.0, 33, 1), (0.01, 1, 1)])
+def test_few_sharp_layers_have_one_decimal_more(falloff, count, digits):
+    disc = Shape.of("circle", (1, 0, 0), center=(0, 0), radius=0.2)
+    assert Canvas.of(Scene(512, 512, (Layer((disc,), falloff),) * count, None)).digits == digits
 
 
 def test_whole_numbers_of_units():
