@@ -154,11 +154,13 @@ class Exports:
             made = exporter.draw(drawn, options, grain)
             lost = self._lost_by(scene, drawn, (made.error / 255) ** 2)
             if lost <= most:
-                told = (
-                    _lost(lost) if lost <= LITTLE else f"{self._near(scene) - lost:.1f} dB from the picture"
-                )
-                return replace(made, notes=(f"{exporter.suffix[1:]}: drawn small, {told}", *made.notes))
+                note = f"{exporter.suffix[1:]}: drawn small, {self._told(scene, lost)}"
+                return replace(made, notes=(note, *made.notes))
         return None
+
+    def _told(self, scene: Scene, lost: float) -> str:
+        """What a drawing loses of the picture; where that is much because the scene is so near, what it comes to."""
+        return _lost(lost) if lost <= LITTLE else f"{self._near(scene) - lost:.1f} dB from the picture"
 
     def _loses_more(self, exporter: Exporter, scene: Scene, options: Options) -> bool:
         """Whether the finest small drawing loses more than it may, which no fit would mend."""

@@ -25,12 +25,7 @@ NARROWEST = (1.1, 1.5)  # pixels: of the narrowest blurs, on which renderers agr
 LEAST_FREE = 1.8  # pixels, from which on softnesses are free
 LEAST = 2.15  # pixels, of a free one: renderers have nothing between it and the narrowest ones
 GROWTH = 1.1  # of a triangle's spread, where its edge moves outwards
-GROWING = (
-    "radius",
-    "radii",
-    "half_size",
-    "corner_radius",
-)  # numbers that a shape is as much larger by; others have corners
+GROWING = ("radius", "radii", "half_size", "corner_radius")  # what a shape is larger by; others have corners
 TINY = 1e-12
 
 
