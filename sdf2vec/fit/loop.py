@@ -30,7 +30,7 @@ from .pilots import PHASE as PILOT
 from .pilots import pilot_preset, pilot_settings, shares_of
 from .presets import MSE, Phase, Preset, Start
 from .settings import Settings, preset_of
-from .steady import HARDLY_SEEN, MATTERS, Steady
+from .steady import Steady, small_loss
 from .surroundings import View
 from .views import scaled, view_of
 
@@ -286,7 +286,8 @@ class Fit:
         if phase.growth is None and phase.relocation is None:
             project(self.tensors, self.pixel, self.preset.falloff)  # a start may be out of range
             best = Best(self.tensors)
-        self.steady.begin(self._small_loss(stage))
+        ground = mean_color(stage.target, stage.weights)
+        self.steady.begin(small_loss(stage.measure, stage.target, ground))
         try:
             self._take_steps(stage, moves, best)
         finally:  # also when stopped
@@ -342,13 +343,6 @@ class Fit:
     @torch.no_grad()
     def _loss(self, stage: Stage) -> float:
         return float(self._value(stage))
-
-    @torch.no_grad()
-    def _small_loss(self, stage: Stage) -> float:
-        """What may rise and fall: a share of what the best ground alone has, or an error that is hardly seen."""
-        ground = mean_color(stage.target, stage.weights)[: len(stage.target), None, None]
-        bare = stage.measure(ground.expand_as(stage.target).contiguous())
-        return max(MATTERS * float(bare), float(stage.measure(stage.target + HARDLY_SEEN)))
 
     def _settle(self, stage: Stage) -> None:
         """Before the layers change, or at an end: back to what was good, unless it still is."""

@@ -10,6 +10,7 @@ import torch
 from ..errors import Sdf2vecWarning
 from ..render.tensors import SceneTensors
 from .adam import Adam
+from .losses import Objective
 
 KEEP_EVERY = 10  # steps
 RUNS_AWAY = 1.5  # times the least loss kept; at the presets' rates, 1.1 was the most seen
@@ -83,3 +84,12 @@ class Steady:
             said.append(f"{self.dropped} derivatives of the fit were no numbers and moved nothing")
         for line in said:
             warnings.warn(line, Sdf2vecWarning, stacklevel=2)
+
+
+@torch.no_grad()
+def small_loss(measure: Objective, target: torch.Tensor, ground: torch.Tensor) -> float:
+    """What may rise and fall: a share of what the best ground [4] alone has, or an error that is hardly seen."""
+    bare = ground[: len(target), None, None].expand_as(target).contiguous()
+    off = target.clone()
+    off[:3] += HARDLY_SEEN
+    return max(MATTERS * float(measure(bare)), float(measure(off)))
