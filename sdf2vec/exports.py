@@ -19,7 +19,7 @@ from .export.byte_limit import ByteLimit
 from .export.exported import Exported
 from .export.options import PICTURE, Options
 from .export.rounding import COARSEST, FINEST, Rounded, Rounding
-from .grain import DENSE, GRAINS, USUAL, Grain
+from .grain import DENSE, GRAINS, USUAL, Grain, is_few_and_sharp
 from .scene import Scene
 from .steps import StepsOf
 
@@ -27,7 +27,6 @@ if TYPE_CHECKING:
     from .fit.settling import Views
     from .image import Picture
 
-FEW = 32  # sharp shapes, of which plain elements with names are small enough
 HARDLY, LITTLE = 0.2, 0.5  # dB that a small drawing may lose of the picture: a coarse one, a finer one
 LIKE_RENDER, SAME = 42.0, 99.0  # dB from the render; dB of what is the same
 LARGER = 0.7  # of a size limit: where the finest small drawing takes more, others take too much
@@ -304,9 +303,7 @@ class Exports:
 
 def _is_plain(scene: Scene) -> bool:
     """Whether an SVG of plain elements, with names, is small enough."""
-    return len(scene.layers) <= FEW and not any(
-        layer.falloff or len(layer.shapes) > 1 for layer in scene.layers
-    )
+    return is_few_and_sharp(scene) and all(len(layer.shapes) == 1 for layer in scene.layers)
 
 
 def _mixes_colors(scene: Scene) -> bool:

@@ -7,6 +7,8 @@ from typing import NamedTuple
 from .blend import OVER
 from .scene import Scene
 
+FEW = 32  # layers
+
 
 class Grain(NamedTuple):
     """How coarse a small drawing is: `units` along the shortest side, how many `softnesses` of two pixels and more,
@@ -34,3 +36,8 @@ USUAL = GRAINS[2::-1]  # what is tried where no size is asked for, smallest firs
 def is_drawable(scene: Scene) -> bool:
     """Whether a blurred element can draw each of a scene's layers."""
     return scene.compositing == OVER and not any(layer.is_patch for layer in scene.layers)
+
+
+def is_few_and_sharp(scene: Scene) -> bool:
+    """Whether a scene is of so few layers, all sharp, that every edge counts and plain elements are small enough."""
+    return len(scene.layers) <= FEW and not any(layer.falloff for layer in scene.layers)

@@ -37,10 +37,8 @@ PHASES = (
 )
 GOING_ON = PHASES[1:]  # from what has settled more coarsely
 SOLVED = 700  # numbers of layers, at most, that settle by least squares
-SHARES, EACH = (
-    (0.0, 0.2, 0.35, 0.5, 0.6, 0.75, 0.97),
-    6,
-)  # what has settled before so many of these steps
+SHARES = 0.0, 0.2, 0.35, 0.5, 0.6, 0.75, 0.97  # of all, that have settled before so many of these steps
+EACH = 6
 DUE = {  # from which share of the steps on numbers of a precision settle, and when all have
     "place": (0.0, 0.6),
     "falloff": (0.4, 0.65),

@@ -79,10 +79,10 @@ def best_blur(layer: Layer, canvas: Canvas) -> Blurred | None:
     return nearest([plain, best, *(trial.judged(*edge, other) for other in others)])
 
 
-def best_traced(layer: Layer, canvas: Canvas, deviations: Sequence[float] | None = None) -> Blurred | None:
+def best_traced(layer: Layer, canvas: Canvas, deviation: float | None = None) -> Blurred | None:
     """The nearest blur of a contour of a layer that has no outline of its own; None where nothing is seen.
 
-    `deviations`: what it may be blurred by, in scene units; without, by about what the falloff asks for, or not at all.
+    `deviation`: what it is blurred by, in scene units; without, by about what the falloff asks for, or not at all.
     """
     trial = trial_of(layer, canvas, *TRACED_CELLS)
     field = distances(layer, trial.grid) - 0.5 * layer.falloff
@@ -91,12 +91,12 @@ def best_traced(layer: Layer, canvas: Canvas, deviations: Sequence[float] | None
         return None
     # 1 for a true distance
     steep = max(float(np.sum(edge * steepness(field, trial.grid.step)) / edge.sum()), 0.1)
-    usual = [trial.deviation(width / steep) for width in WIDTHS]
-    tried = [found for deviation in deviations or usual for found in trial.moved(field / steep, deviation)]
-    if deviations is None:
-        plain = Traced(tuple(contours(field, 0.0, trial.grid)))
-        tried.append(trial.judged(plain, field / steep, 0.0))
-    return nearest(tried)
+    if deviation is not None:
+        return nearest(list(trial.moved(field / steep, deviation)))
+    widths = (trial.deviation(width / steep) for width in WIDTHS)
+    tried = [found for width in widths for found in trial.moved(field / steep, width)]
+    plain = Traced(tuple(contours(field, 0.0, trial.grid)))
+    return nearest([*tried, trial.judged(plain, field / steep, 0.0)])
 
 
 def steepness(field: Float64Array, step: float) -> Float64Array:

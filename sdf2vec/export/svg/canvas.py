@@ -8,11 +8,11 @@ from dataclasses import dataclass
 import numpy as np
 
 from ...arrays import Float64Array
+from ...grain import is_few_and_sharp
 from ...outlines import Point
 from ...scene import Scene
 
 Points = Float64Array  # [N, 2]
-FEW = 32  # sharp layers, whose edges are the drawing: long ones show where they are by a fiftieth of a pixel
 
 
 @dataclass(frozen=True)
@@ -33,8 +33,8 @@ class Canvas:
     def of(cls, scene: Scene, coarser: int = 0) -> Canvas:
         """The canvas of a scene in pixels, with some decimals fewer than usual; of few sharp layers, with one more."""
         unit = float(min(scene.width, scene.height))
-        plain = 0 < len(scene.layers) <= FEW and not any(layer.falloff for layer in scene.layers)
-        digits = max(0, math.ceil(3.4 - math.log10(unit)), 1) + plain - coarser
+        finer = 1 if scene.layers and is_few_and_sharp(scene) else 0
+        digits = max(0, math.ceil(3.4 - math.log10(unit)), 1) + finer - coarser
         return cls(scene.width, scene.height, unit, max(0, digits))
 
     @classmethod

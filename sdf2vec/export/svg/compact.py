@@ -26,10 +26,8 @@ from .sharp_edges import NOWHERE, sharp_edge
 from .union_gradient import fill_of
 from .visibility import LayerSamples, contrasts, layers_at, showing
 
-TOLERANCE = (
-    0.5,
-    0.15,
-)  # user units or, if that is more, pixels of the fitted picture that a traced contour may be off
+# User units or, if that is more, pixels of the fitted picture that a traced contour may be off.
+TOLERANCE = 0.5, 0.15
 STRAYED = 0.2  # of a contour's tolerance, that curves are off: the root of the mean square
 ROUNDED = 1.0 / 12.0  # mean squared change of a number that is rounded to a whole one
 
@@ -137,7 +135,7 @@ def _blurred(layer: Layer, canvas: Canvas) -> tuple[Geometry, Difference | None]
 
 def _traced(layer: Layer, canvas: Canvas) -> tuple[Geometry, Difference | None]:
     """A contour whose blur is nearest."""
-    best = best_traced(layer, canvas, [_deviation(layer)])
+    best = best_traced(layer, canvas, _deviation(layer))
     if best is None:
         return NOWHERE, None
     assert isinstance(best.outline, Traced)

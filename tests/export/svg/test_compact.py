@@ -63,5 +63,8 @@ def test_a_tighter_limit_takes_no_more_from_the_picture_than_it_must(softest, re
     found = [-10 * np.log10(np.mean((ENGINES["resvg"].render(t, 480, 360) - wanted) ** 2)) for t in texts]
     steps = -np.diff(found)
     assert len(steps) >= 5
-    assert steps.min() > -2.0, found
+    assert steps[1:].min() > -1.0, found
+    assert (
+        steps[0] > -1.5
+    )  # where all are sharp the finest small one is nearer: its colours are rounded together
     assert steps.max() < 8.0, found
