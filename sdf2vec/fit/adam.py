@@ -58,6 +58,14 @@ class Moving:
             eps=EPSILON,
         )
 
+    def turned(self) -> tuple[float, float, float]:
+        """Of the derivative and of its running mean, in units of Adam's steps: their product, and both squared."""
+        if self.tensor.grad is None or not float(self.steps):
+            return 0.0, 0.0, 0.0
+        unit = self.square.sqrt() + EPSILON
+        now, before = self.tensor.grad / unit, self.mean / unit
+        return float((now * before).sum()), float((now * now).sum()), float((before * before).sum())
+
 
 class Adam:
     """Adam (Kingma and Ba 2015) with β₁ = β₂ = 0.9: a shape that moves soon meets other slopes."""
@@ -75,6 +83,15 @@ class Adam:
         """One step, all rates scaled by a factor."""
         for moving in self.moving:
             moving.step(factor)
+
+    @torch.no_grad()
+    def agreement(self) -> float:
+        """The cosine of the angle between the present derivative and the steps of late: near 1 where they are short.
+
+        What hypergradient descent follows (Baydin et al. 2018). 0 before the first step.
+        """
+        both, now, before = (sum(part) for part in zip(*(m.turned() for m in self.moving), strict=True))
+        return both / math.sqrt(now * before) if now * before > 0 else 0.0
 
     @torch.no_grad()
     def forget(self) -> None:

@@ -326,7 +326,9 @@ class Fit:
         self.steady.drop_what_is_not_finite(self.optimizer)
         if moves is not None:
             _freeze(self.tensors, moves)
-        self.optimizer.step(rate * self.steady.rate)
+        if not stage.phase.slows:
+            self.steady.lengthen(self.optimizer)
+        self.optimizer.step(rate * self.steady.factor)
         project(self.tensors, self.pixel, self.preset.falloff)
         if self.done % THICKEN_EVERY == 0:
             enforce_min_thickness(self.tensors, self.pixel)

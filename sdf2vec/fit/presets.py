@@ -74,6 +74,11 @@ class Phase:
         """Steps of all batches."""
         return self.steps * self.batches
 
+    @property
+    def slows(self) -> bool:
+        """Whether its steps become short at its end."""
+        return self.end_rate < 0.5 * self.rate
+
     def rates(self) -> Iterator[float]:
         """The factor on all rates at each step."""
         for step in range(self.steps):
