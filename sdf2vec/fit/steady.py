@@ -30,7 +30,7 @@ class Steady:
 
     def __init__(self) -> None:
         self.rate, self.taken_back, self.dropped = 1.0, 0, 0
-        self.stride, self.agreement = 1.0, 0.0
+        self.stride, self.longest, self.agreement = 1.0, LONGEST, 0.0
         self.begin(0.0)
 
     @property
@@ -73,6 +73,9 @@ class Steady:
         for tensor, good in self.kept:
             tensor.copy_(good)
         optimizer.forget()
+        if self.stride > 1.0:
+            self.stride, self.longest = 1.0, math.sqrt(self.stride)
+            return
         self.rate *= SLOWER
         self.taken_back += 1
 
@@ -80,7 +83,7 @@ class Steady:
         """Longer steps, where the slope hardly turns from one to the next."""
         self.agreement += LATELY * (optimizer.agreement() - self.agreement)
         if self.agreement > AGREES:
-            self.stride = min(LONGEST, self.stride * LONGER)
+            self.stride = min(self.longest, self.stride * LONGER)
 
     def drop_what_is_not_finite(self, optimizer: Adam) -> None:
         """Derivatives that are no numbers move nothing."""
