@@ -27,6 +27,7 @@ GRAINS = (  # finest first
     Grain(1024, 20, 255, 100, 0.8),
     Grain(512, 12, 255, 20, 0.6),
     Grain(256, 8, 51, 10, 1.0),
+    Grain(200, 5, 25, 10, 1.5),
     Grain(160, 3, 15, 10, 2.0),
 )
 DENSE = GRAINS[3]  # more shapes of it say more of a picture than fewer finer ones, or yet more coarser ones
