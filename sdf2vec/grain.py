@@ -2,17 +2,20 @@
 
 from __future__ import annotations
 
+import math
 from typing import NamedTuple
 
 from .blend import OVER
 from .scene import Scene
 
-FEW = 32  # layers
+FEW, MANY = 32, 128  # layers
 
 
 class Grain(NamedTuple):
     """How coarse a small drawing is: `units` along the shortest side, how many `softnesses` of two pixels and more,
     steps of `colors` and `opacities`. One more filter is worth blurring this share of the canvas' pixels in vain.
+
+    Of fewer layers than MANY, fewer softnesses (but `fewest`) and filters say as much.
     """
 
     units: int
@@ -20,11 +23,18 @@ class Grain(NamedTuple):
     colors: int
     opacities: int
     filter: float
+    fewest: int = 3
+
+    def for_layers(self, count: int) -> Grain:
+        """For a drawing of so many layers."""
+        share = math.sqrt(min(1.0, max(count, 1) / MANY))
+        softnesses = max(self.fewest, round(self.softnesses * share))
+        return self._replace(softnesses=softnesses, filter=self.filter / share)
 
 
 GRAINS = (  # finest first
-    Grain(4096, 20, 255, 100, 0.8),
-    Grain(1024, 20, 255, 100, 0.8),
+    Grain(4096, 20, 255, 100, 0.8, fewest=20),
+    Grain(1024, 12, 255, 100, 0.8),
     Grain(512, 12, 255, 20, 0.6),
     Grain(256, 8, 51, 10, 1.0),
     Grain(200, 5, 25, 10, 1.5),

@@ -52,7 +52,8 @@ def drawable(scene: Scene, views: Views, grain: Grain, coarser: Scene | None = N
 def _settling(tensors: SceneTensors, scene: Scene, grain: Grain) -> list[Settling]:
     """The groups of a scene, whose layers have the falloffs of their classes from now on."""
     if tensors.groups:
-        _soften(tensors, scene.pixel, grain.softnesses)
+        own = torch.cat([group.falloff for group in from_scene(scene).groups])
+        _soften(tensors, own, scene.pixel, grain.for_layers(len(own)).softnesses)
     return [
         Settling(group, _steps(group, grain, tensors.size), partial(_unfold, group, grain))
         for group in tensors.groups
@@ -79,10 +80,10 @@ def softnesses(deviations: Float64Array, count: int) -> Float64Array:
 
 
 @torch.no_grad()
-def _soften(tensors: SceneTensors, pixel: float, count: int) -> None:
-    """Gives each layer the falloff of its class, in place; its edge stays where coverage is one half."""
+def _soften(tensors: SceneTensors, falloffs: torch.Tensor, pixel: float, count: int) -> None:
+    """Gives each layer the falloff of the class of its own [N, 1], in place; its edge stays where coverage is one half."""
     before = torch.cat([group.falloff for group in tensors.groups])
-    deviations = (EDGE_DEVIATION / pixel * before[:, 0]).double().numpy()
+    deviations = (EDGE_DEVIATION / pixel * falloffs[:, 0]).double().numpy()
     after = torch.from_numpy(softnesses(deviations, count) * (pixel / EDGE_DEVIATION)).float()[:, None]
     sizes = [len(group) for group in tensors.groups]
     for group, old, new in zip(tensors.groups, before.split(sizes), after.split(sizes), strict=True):

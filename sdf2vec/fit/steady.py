@@ -62,7 +62,8 @@ class Steady:
     def _is_fine(self, loss: float) -> bool:
         if not math.isfinite(loss):
             return not self.kept
-        return loss <= max(RUNS_AWAY * self.loss, self.small)
+        small = self.small if self.stride == 1.0 else 0.0
+        return loss <= max(RUNS_AWAY * self.loss, small)
 
     def _keep(self, loss: float, scene: SceneTensors) -> None:
         tensors = [scene.background, *(t for group in scene.groups for t in group.values.values())]

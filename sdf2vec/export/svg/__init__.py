@@ -72,12 +72,12 @@ def draws(scene: Scene, options: Options) -> bool:
 def small_svg(scene: Scene, options: Options, grain: Grain) -> Exported:
     """A scene whose numbers a drawing of this grain can say, in the smallest text."""
     drawing, error = drawn(scene, grain)
-    return Exported(_written(drawing, options, _small(grain)), error=error)
+    return Exported(_written(drawing, options, _small(scene, grain)), error=error)
 
 
 def sketch_svg(scene: Scene, options: Options, grain: Grain) -> Exported:
     """The same, quickly: its size tells that of the drawing."""
-    return Exported(_written(sketched(scene, grain), options, _small(grain)))
+    return Exported(_written(sketched(scene, grain), options, _small(scene, grain)))
 
 
 def data_uri(scene: Scene, options: Options) -> Exported:
@@ -145,8 +145,8 @@ def _text(planner: Planner, detail: Detail, options: Options) -> str:
     return _written(drawing(planner.scene, planner.plan(detail), detail), options, Style(detail.named))
 
 
-def _small(grain: Grain) -> Style:
-    return Style(named=False, compact=True, filter=grain.filter)
+def _small(scene: Scene, grain: Grain) -> Style:
+    return Style(named=False, compact=True, filter=grain.for_layers(len(scene.layers)).filter)
 
 
 def _written(drawing: Drawing, options: Options, style: Style) -> str:

@@ -86,6 +86,9 @@ class _Writer:
         self.ids: dict[str, str] = {}
         self.classes: dict[str, str] = {}
         self.roundings = _usual_roundings(drawing.items)
+        self.strokes = style.compact and any(
+            isinstance(item, Figure) and rounding_of(item) > 0.0 for item in drawing.items
+        )
         self.regions = shared_regions(drawing, style.filter) if style.compact else {}
 
     def text(self) -> str:
@@ -94,7 +97,7 @@ class _Writer:
         if drawing.ground is not None:
             body.add(body.rect((None, None), ("100%", "100%"), **_ground_fill(drawing.ground)))
         items = [self.item(item) for item in drawing.items]
-        if self.style.compact and items:
+        if self.strokes:
             body = self.svg.add(self.svg.g(**STROKES))
         for item in items:
             body.add(item)
@@ -131,7 +134,7 @@ class _Writer:
         rounding = rounding_of(figure)
         look: Attributes = {"opacity": opacity_text(figure.opacity)}
         paint = self.paint(figure.fill, figure)
-        if isinstance(figure.fill, tuple):
+        if self.strokes and isinstance(figure.fill, tuple):
             look["color"] = paint
         else:
             look |= {"fill": paint, "stroke": paint if rounding else None}
