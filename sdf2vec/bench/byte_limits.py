@@ -1,6 +1,6 @@
 """What so many bytes of an export can say of a picture, beside WebP's. Writes a table in Markdown.
 
-python -m sdf2vec.bench.byte_limits examples/coffee.png --limits 1000,4000,16000 -o docs/byte-limits.md
+python -m sdf2vec.bench.byte_limits examples/coffee.png --limits 1250gz,4000,16000 -o docs/byte-limits.md
 """
 
 from __future__ import annotations
@@ -14,44 +14,74 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
+import torch
 from PIL import Image
 
 from .. import api
 from ..arrays import Float32Array
+from ..engines import ENGINES
+from ..export.byte_limit import ByteLimit, gzipped_size
 from ..files import write_atomically
+from ..flip import flip
 from ..image import Picture, load
 from ..roundtrip import ROUND_TRIPS
 
-TARGETS = ("svg", "shadertoy")
+TARGETS = "svg,shadertoy"
+DRAWN = "resvg", "chromium", "opengl"  # by which engines, as far as a target has them
 SIDES = (12, 16, 24, 32, 48, 64, 96, 128, 192, 256)  # pixels along the longer one of a thumbnail
 QUALITIES = (1, 5, 10, 20, 35, 50, 75)
 
 
 class Row(NamedTuple):
-    """One limit: what was written, and how near an engine draws it to the picture."""
+    """One limit: what was written, and how near to the picture the engine draws it that draws it worst."""
 
     picture: str
     target: str
-    limit: int
-    bytes: int
+    limit: str
+    raw: int  # bytes
+    zipped: int  # bytes
     shapes: int
+    engine: str
     psnr: float  # dB
+    flip: float
     webp: float  # dB of the nearest WebP that is no larger
     seconds: float  # CPU
 
 
-def measured(path: Path, target: str, limit: int, **options: Any) -> Row:
-    """One fit within a limit, drawn by the first engine of its target."""
+def measured(path: Path, target: str, limit: str, **options: Any) -> Row:
+    """One fit within a limit, drawn by each engine of its target that most people see it with."""
     picture = load(path)
     started = time.process_time()
     share = api.share_of([target], max_bytes=limit)
     scene = api.fitted(picture, share=share, **options).scene
     made = api.exported(scene, target, picture=picture, max_bytes=limit)
     seconds = time.process_time() - started
-    drawn = ROUND_TRIPS[target][0].draw(made, scene, picture.width, picture.height)
-    near = psnr(drawn[..., :3], picture.pixels[..., :3])
-    webp = nearest_webp(picture, limit)
-    return Row(path.name, target, limit, len(made.raw), scene.shape_count, near, webp, seconds)
+    drawn = {
+        trip.engine: trip.draw(made, scene, picture.width, picture.height)
+        for trip in reversed(ROUND_TRIPS[target])
+        if trip.engine in DRAWN and not ENGINES[trip.engine].missing()
+    }
+    near = {engine: psnr(image[..., :3], picture.pixels[..., :3]) for engine, image in drawn.items()}
+    worst = min(near, key=near.__getitem__)
+    shown, seen = (_planes(image) for image in (drawn[worst], picture.pixels))
+    return Row(
+        path.name,
+        target,
+        limit,
+        len(made.raw),
+        gzipped_size(made.raw),
+        scene.shape_count,
+        worst,
+        near[worst],
+        float(flip(shown, seen)),
+        nearest_webp(picture, ByteLimit.of(limit).most),
+        seconds,
+    )
+
+
+def _planes(image: Float32Array) -> torch.Tensor:
+    """[3, H, W]"""
+    return torch.from_numpy(np.ascontiguousarray(image[..., :3].transpose(2, 0, 1), np.float32))
 
 
 def psnr(image: Float32Array, other: Float32Array) -> float:
@@ -83,16 +113,19 @@ def table(rows: list[Row], command: str) -> Iterator[str]:
         "",
         f"    {command}",
         "",
-        "Text as written with `--max-bytes`, drawn by an engine (resvg, OpenGL) at the picture's size; PSNR against "
-        "it. WebP: the nearest of several sizes and qualities that is no larger, drawn large by bicubic interpolation.",
+        "Text as written with `--max-bytes` (`gz`: gzipped), drawn by resvg and Chromium, whichever is worse, or by OpenGL, "
+        "at the picture's size; PSNR and FLIP against it. WebP: the nearest of several sizes and qualities that is no larger "
+        "than the limit, drawn large by bicubic interpolation.",
         "",
-        "| picture | target | limit | bytes | used | shapes | PSNR dB | WebP dB | CPU s |",
-        "|---|---|---:|---:|---:|---:|---:|---:|---:|",
+        "| picture | target | limit | bytes | gzipped | used | shapes | engine | PSNR dB | FLIP | WebP dB | CPU s |",
+        "|---|---|---:|---:|---:|---:|---:|---|---:|---:|---:|---:|",
     )
     for row in rows:
+        limit = ByteLimit.of(row.limit)
+        used = (row.zipped if limit.gzipped else row.raw) / limit.most
         yield (
-            f"| {row.picture} | {row.target} | {row.limit} | {row.bytes} | {row.bytes / row.limit:.0%} "
-            f"| {row.shapes} | {row.psnr:.2f} | {row.webp:.2f} | {row.seconds:.0f} |"
+            f"| {row.picture} | {row.target} | {row.limit} | {row.raw:,} | {row.zipped:,} | {used:.0%} | {row.shapes} "
+            f"| {row.engine} | {row.psnr:.2f} | {row.flip:.4f} | {row.webp:.2f} | {row.seconds:.0f} |"
         )
 
 
@@ -102,20 +135,24 @@ def main() -> None:
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
     parser.add_argument("pictures", type=Path, nargs="+", metavar="PICTURE")
-    parser.add_argument("--limits", default="1000,4000,16000", help="bytes")
+    parser.add_argument("--limits", default="1000,4000,16000", help="bytes, or gzipped as 4000gz")
+    parser.add_argument("--targets", default=TARGETS)
+    parser.add_argument("--max-shapes", type=int, default=256)
     parser.add_argument("--preset", default="balanced")
     parser.add_argument("--seed", type=int, default=0)
     parser.add_argument("-o", "--output", type=Path)
     options = parser.parse_args()
     rows = []
     for path in options.pictures:
-        for target in TARGETS:
-            for limit in map(int, options.limits.split(",")):
-                rows.append(measured(path, target, limit, preset=options.preset, seed=options.seed))
+        for target in options.targets.split(","):
+            for limit in options.limits.split(","):
+                given = {"preset": options.preset, "seed": options.seed, "max_shapes": options.max_shapes}
+                rows.append(measured(path, target, limit, **given))
                 print(rows[-1], flush=True)
-    names = " ".join(path.as_posix() for path in options.pictures)
+    names = " ".join(path.name for path in options.pictures)
     command = (
-        f"python -m sdf2vec.bench.byte_limits {names} --limits {options.limits} --preset {options.preset}"
+        f"python -m sdf2vec.bench.byte_limits {names} --limits {options.limits} --targets {options.targets} "
+        f"--preset {options.preset} --max-shapes {options.max_shapes}"
     )
     if options.output:
         write_atomically(options.output, ("\n".join(table(rows, command)) + "\n").encode())

@@ -81,7 +81,7 @@ def softnesses(deviations: Float64Array, count: int) -> Float64Array:
 
 @torch.no_grad()
 def _soften(tensors: SceneTensors, falloffs: torch.Tensor, pixel: float, count: int) -> None:
-    """Gives each layer the falloff of the class of its own [N, 1], in place; its edge stays where coverage is one half."""
+    """Gives each layer the falloff of the class of its own [N, 1], in place; where coverage is one half stays."""
     before = torch.cat([group.falloff for group in tensors.groups])
     deviations = (EDGE_DEVIATION / pixel * falloffs[:, 0]).double().numpy()
     after = torch.from_numpy(softnesses(deviations, count) * (pixel / EDGE_DEVIATION)).float()[:, None]
