@@ -113,9 +113,9 @@ def table(rows: list[Row], command: str) -> Iterator[str]:
         "",
         f"    {command}",
         "",
-        "Text as written with `--max-bytes` (`gz`: gzipped), drawn by resvg and Chromium, whichever is worse, or by OpenGL, "
-        "at the picture's size; PSNR and FLIP against it. WebP: the nearest of several sizes and qualities that is no larger "
-        "than the limit, drawn large by bicubic interpolation.",
+        "Text as written with `--max-bytes` (`gz`: gzipped), drawn at the picture's size by resvg and Chromium, "
+        "whichever is worse, or by OpenGL; PSNR and FLIP against the picture. WebP: the nearest of several sizes and "
+        "qualities that is no larger than the limit, drawn large by bicubic interpolation.",
         "",
         "| picture | target | limit | bytes | gzipped | used | shapes | engine | PSNR dB | FLIP | WebP dB | CPU s |",
         "|---|---|---:|---:|---:|---:|---:|---|---:|---:|---:|---:|",

@@ -58,13 +58,14 @@ class Moving:
             eps=EPSILON,
         )
 
-    def turned(self) -> tuple[float, float, float]:
-        """Of the derivative and of its running mean, in units of Adam's steps: their product, and both squared."""
-        if self.tensor.grad is None or not float(self.steps):
-            return 0.0, 0.0, 0.0
-        unit = self.square.sqrt() + EPSILON
-        now, before = self.tensor.grad / unit, self.mean / unit
-        return float((now * before).sum()), float((now * now).sum()), float((before * before).sum())
+    def products(self) -> torch.Tensor:
+        """Of the derivative and of its running mean, in units of Adam's steps: their product, and both squared [3]."""
+        if self.tensor.grad is None:
+            return self.mean.new_zeros(3)
+        now, before = self.tensor.grad.flatten(), self.mean.flatten()
+        units = self.square.flatten() + EPSILON**2
+        scaled = before / units
+        return torch.stack([now.dot(scaled), now.dot(now / units), before.dot(scaled)])
 
 
 class Adam:
@@ -90,7 +91,9 @@ class Adam:
 
         What hypergradient descent follows (Baydin et al. 2018). 0 before the first step.
         """
-        both, now, before = (sum(part) for part in zip(*(m.turned() for m in self.moving), strict=True))
+        if not self.moving:
+            return 0.0
+        both, now, before = torch.stack([moving.products() for moving in self.moving]).sum(0).tolist()
         return both / math.sqrt(now * before) if now * before > 0 else 0.0
 
     @torch.no_grad()
