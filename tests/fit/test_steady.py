@@ -11,7 +11,7 @@ import sdf2vec
 from sdf2vec import Layer, Scene, Shape
 from sdf2vec.errors import Sdf2vecWarning
 from sdf2vec.fit import loop
-from sdf2vec.fit.adam import adam_over
+from sdf2vec.fit.adam import Adam, adam_over
 from sdf2vec.fit.presets import PRESETS
 from sdf2vec.fit.steady import KEEP_EVERY, LONGER, LONGEST, RUNS_AWAY, SLOWER, Steady
 from sdf2vec.quality import psnr_of
@@ -156,9 +156,12 @@ def test_rates_a_tenth_as_high_are_raised():
 def test_default_rates_stay_for_many_shapes(monkeypatch):
     strides = []
     lengthen = Steady.lengthen
-    monkeypatch.setattr(
-        Steady, "lengthen", lambda *given: (lengthen(*given), strides.append(given[0].stride))
-    )
+
+    def noted(steady: Steady, optimizer: Adam) -> None:
+        lengthen(steady, optimizer)
+        strides.append(steady.stride)
+
+    monkeypatch.setattr(Steady, "lengthen", noted)
     fitted(picture(), 24, preset="fast")
     assert strides
     assert set(strides) == {1.0}
