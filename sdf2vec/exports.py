@@ -30,6 +30,10 @@ if TYPE_CHECKING:
 HARDLY, LITTLE = 0.2, 0.5  # dB that a small drawing may lose of the picture: a coarse one, a finer one
 LIKE_RENDER, SAME = 42.0, 99.0  # dB from the render; dB of what is the same
 LARGER = 0.7  # of a size limit: where the finest small drawing takes more, others take too much
+SURE = (
+    0.985  # of a size limit: what keeps within this keeps within the limit when its numbers are fitted again
+)
+ASTRAY = 1.0  # dB that a coarse drawing loses of the picture: a finer one does not go on from it
 ABOUT = 1.03  # of a size limit, that a drawing which is still to be fitted may seem to take
 
 WASTED = 0.15  # dB that rounded numbers may lose of the picture
@@ -213,6 +217,8 @@ class Exports:
     def _fit_small(self, scene: Scene, grain: Grain) -> Scene:
         """The scene nearest to the picture that a drawing of this grain can say."""
         coarser = self._drawn(scene, USUAL[0]) if grain in USUAL[1:] else None
+        if coarser and self._lost_by(scene, coarser) > ASTRAY:
+            coarser = None
         with self._phase("fit drawing"):
             return _drawable(scene, self._views, grain, coarser)
 
@@ -316,13 +322,15 @@ def _lost(decibels: float) -> str:
 
 
 def share_of_limit(targets: Sequence[str], options: Options) -> Callable[[Scene], float]:
-    """How much of the size limit the largest of some exports of a scene takes, each in a small form."""
+    """How much of the size limit the largest of some exports of a scene takes, each in a small form; a little more, as
+    its numbers are still to be fitted.
+    """
     limit = ByteLimit.of(options.max_bytes or "")
     for target in targets:
         check_choice("target", target, EXPORTERS)
 
     def share(scene: Scene) -> float:
         exports = Exports(scene)
-        return max(limit.share(exports.densest(target, options).raw) for target in targets)
+        return max(limit.share(exports.densest(target, options).raw) for target in targets) / SURE
 
     return share

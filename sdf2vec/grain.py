@@ -28,14 +28,14 @@ class Grain(NamedTuple):
     def for_layers(self, count: int) -> Grain:
         """For a drawing of so many layers."""
         share = math.sqrt(min(1.0, max(count, 1) / MANY))
-        softnesses = max(self.fewest, round(self.softnesses * share))
+        softnesses = min(self.softnesses, max(self.fewest, round(self.softnesses * share)))
         return self._replace(softnesses=softnesses, filter=self.filter / share)
 
 
 GRAINS = (  # finest first
     Grain(4096, 20, 255, 100, 0.8, fewest=20),
-    Grain(1024, 12, 255, 100, 0.8),
-    Grain(512, 12, 255, 20, 0.6),
+    Grain(1024, 12, 255, 100, 0.8, fewest=5),
+    Grain(512, 12, 255, 20, 0.6, fewest=5),
     Grain(256, 8, 51, 10, 1.0),
     Grain(200, 5, 25, 10, 1.5),
     Grain(160, 3, 15, 10, 2.0),

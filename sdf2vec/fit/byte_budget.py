@@ -23,7 +23,7 @@ from .views import view_of
 
 Share = Callable[[Scene], float]  # of a size limit, above 1 for what is too large
 PROBED = 16, 64  # shapes of each sort that are tried first: as many as may be needed, or a quarter of them
-ENOUGH, SURE = 0.93, 0.985  # of the limit: what is to be used; what numbers that are fitted again keep within
+ENOUGH = 0.93  # of the limit, that is to be used
 FITS = 3  # of full length, at most
 SLOPE = 1.7  # dB for twice the shapes, about
 RESOLUTION = 128  # pixels squared, where it is seen which shapes matter least
@@ -54,7 +54,7 @@ def within(picture: Picture, settings: Settings, share: Share, callback: Callbac
         scene, taken = _trimmed(scene, view, share, each, taken)
         if (now := psnr_of(scene, picture)) > near:
             best, near = (scene, taken), now
-        more = min(math.floor((SURE - empty) / each), settings.most)
+        more = min(math.floor((1.0 - empty) / each), settings.most)
         if taken >= ENOUGH or more <= count:
             break
         count = more
@@ -93,7 +93,7 @@ def _probe(settings: Settings, picture: Picture, share: Share, callback: Callbac
     few = fit_concisely(picture, structs.replace(settings, shapes=count, preset="fast"), callback)
     least, most = share(replace(few, layers=few.layers[:1])), share(few)
     each = max((most - least) / max(count - 1, 1), 1e-9)
-    wanted = 1 + math.floor((SURE - least) / each) if least <= SURE else 0
+    wanted = 1 + math.floor((1.0 - least) / each) if least <= 1.0 else 0
     hoped = psnr_of(few, picture) + SLOPE * math.log2(max(wanted, 1e-3) / count)
     return Probe(settings, min(max(wanted, 1), settings.most), hoped)
 
@@ -101,8 +101,8 @@ def _probe(settings: Settings, picture: Picture, share: Share, callback: Callbac
 def _trimmed(scene: Scene, view: View, share: Share, each: float, taken: float) -> tuple[Scene, float]:
     """The scene without the shapes that matter least, as far as the limit asks for it."""
     tensors = from_scene(scene)
-    while taken > SURE and tensors.layer_count:
-        surplus = math.ceil((taken - SURE) / each)
+    while taken > 1.0 and tensors.layer_count:
+        surplus = math.ceil((taken - 1.0) / each)
         tensors = lighter(tensors, view, min(max(surplus, 1), tensors.layer_count))
         scene = to_scene(tensors, scene.width, scene.height)
         taken = share(scene)

@@ -327,7 +327,7 @@ class Fit:
         if moves is not None:
             _freeze(self.tensors, moves)
         if not stage.phase.slows:
-            self.steady.lengthen(self.optimizer)
+            self.steady.lengthen(self.optimizer, rate)
         self.optimizer.step(rate * self.steady.factor)
         project(self.tensors, self.pixel, self.preset.falloff)
         if self.done % THICKEN_EVERY == 0:

@@ -80,10 +80,13 @@ class Steady:
         self.rate *= SLOWER
         self.taken_back += 1
 
-    def lengthen(self, optimizer: Adam) -> None:
-        """Longer steps, where the slope hardly turns from one to the next."""
+    def lengthen(self, optimizer: Adam, rate: float) -> None:
+        """Longer steps, where the slope hardly turns from one to the next; up to those at the units' own rates.
+
+        Beyond them shapes vanish before they find what they are for: of letters, whose slopes agree at any rate.
+        """
         self.agreement += LATELY * (optimizer.agreement() - self.agreement)
-        if self.agreement > AGREES:
+        if self.agreement > AGREES and self.stride * rate < 1.0:
             self.stride = min(self.longest, self.stride * LONGER)
 
     def drop_what_is_not_finite(self, optimizer: Adam) -> None:

@@ -134,15 +134,23 @@ def test_steps_get_longer_while_the_slope_does_not_turn():
     agrees = iter([0.0] * 5 + [1.0] * 100)
     adam.agreement = lambda: next(agrees)
     for _ in range(5):
-        steady.lengthen(adam)
+        steady.lengthen(adam, 0.05)
     assert steady.factor == 1.0
-    steady.lengthen(adam)  # 0.1, lately
+    steady.lengthen(adam, 0.05)  # 0.1, lately
     assert steady.factor == 1.0
-    steady.lengthen(adam)
+    steady.lengthen(adam, 0.05)
     assert steady.factor == pytest.approx(LONGER)
     for _ in range(98):
-        steady.lengthen(adam)
+        steady.lengthen(adam, 0.05)
     assert steady.factor == LONGEST
+
+
+def test_steps_get_no_longer_than_at_the_units_own_rates():
+    steady, _, adam = watched()
+    adam.agreement = lambda: 1.0
+    for _ in range(100):
+        steady.lengthen(adam, 0.5)
+    assert steady.factor == pytest.approx(2.0, rel=LONGER - 1.0)
 
 
 def test_rates_a_tenth_as_high_are_raised():
@@ -153,15 +161,16 @@ def test_rates_a_tenth_as_high_are_raised():
     assert psnr_of(slow, picture()) > psnr_of(usual, picture()) - 2.0
 
 
-def test_default_rates_stay_for_many_shapes(monkeypatch):
+@pytest.mark.parametrize("count", [8, 24])
+def test_default_rates_stay(monkeypatch, count):
     strides = []
     lengthen = Steady.lengthen
 
-    def noted(steady: Steady, optimizer: Adam) -> None:
-        lengthen(steady, optimizer)
+    def noted(steady: Steady, optimizer: Adam, rate: float) -> None:
+        lengthen(steady, optimizer, rate)
         strides.append(steady.stride)
 
     monkeypatch.setattr(Steady, "lengthen", noted)
-    fitted(picture(), 24, preset="fast")
+    fitted(picture(), count, preset="fast")
     assert strides
     assert set(strides) == {1.0}
