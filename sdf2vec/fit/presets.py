@@ -35,9 +35,9 @@ class Relocation:
 
 @dataclass(frozen=True)
 class Growth:
-    """A fit begins with `first` layers; every so many steps there are twice as many, until all are there.
+    """A fit begins with `first` layers, or half of all if that is fewer; every so many steps there are twice as many.
 
-    Sooner where the phase would end before that.
+    Until all are there; sooner where the phase would end before that.
     """
 
     first: int
@@ -45,9 +45,10 @@ class Growth:
 
     def count(self, step: int, steps: int, full: int) -> int:
         """How many layers of `full` there are to be at this step of a phase of so many."""
-        doublings = max(0, math.ceil(math.log2(full / self.first)))
+        first = max(1, min(self.first, full // 2))
+        doublings = max(0, math.ceil(math.log2(full / first)))
         every = min(self.every, steps // (doublings + 1))
-        return full if step >= doublings * every else self.first << step // every
+        return full if step >= doublings * every else first << step // every
 
 
 @dataclass(frozen=True)
@@ -141,20 +142,20 @@ OFTEN = Relocation(every=25, share=0.05)
 PRESETS: dict[str, Preset] = {
     "fast": Preset(
         (
-            Phase("coarse", 240, 64, relocation=OFTEN, growth=Growth(64, 25)),
+            Phase("coarse", 240, 64, relocation=OFTEN, growth=Growth(16, 25)),
             Phase("fine", 140, 160, rate=0.6, end_rate=0.03, loss=L1_MSE),
         )
     ),
     "balanced": Preset(
         (
-            Phase("coarse", 300, 96, relocation=OFTEN, growth=Growth(64, 40)),
+            Phase("coarse", 300, 96, relocation=OFTEN, growth=Growth(16, 40)),
             Phase("middle", 330, 128, rate=0.8, end_rate=0.6, relocation=OFTEN),
             Phase("fine", 180, 320, rate=0.6, end_rate=0.02, loss=L1_MSE_FLIP),
         )
     ),
     "best": Preset(
         (
-            Phase("coarse", 600, 96, relocation=OFTEN, growth=Growth(64, 40)),
+            Phase("coarse", 600, 96, relocation=OFTEN, growth=Growth(16, 40)),
             Phase("middle", 800, 192, rate=0.8, end_rate=0.6, relocation=OFTEN),
             Phase("fine", 400, 512, rate=0.6, end_rate=0.02, loss=L1_MSE_FLIP),
         )
