@@ -23,7 +23,7 @@ from .views import view_of
 
 Share = Callable[[Scene], float]  # of a size limit, above 1 for what is too large
 PROBED = 16, 64  # shapes of each sort that are tried first: as many as may be needed, or a quarter of them
-ENOUGH = 0.93  # of the limit, that is to be used
+ENOUGH = 0.945  # of the limit, that is to be used
 FITS = 3  # of full length, at most
 SLOPE = 1.7  # dB for twice the shapes, about
 RESOLUTION = 128  # pixels squared, where it is seen which shapes matter least

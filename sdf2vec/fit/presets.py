@@ -11,6 +11,7 @@ Loss = tuple[tuple[str, float], ...]  # name in `losses.LOSSES`, weight
 
 MANY = 256  # shapes beyond which the phases' resolution grows
 SOFTEST = 1.5  # falloff of any shape, in scene units
+DOUBLINGS = 5  # of the number of layers, at most: 2048 that began with 16 ended farther from the picture
 CROWDING = 0.35  # rates of layers fall with this power of their number
 
 L1: Loss = (("l1", 1.0),)
@@ -37,7 +38,7 @@ class Relocation:
 class Growth:
     """A fit begins with `first` layers, or half of all if that is fewer; every so many steps there are twice as many.
 
-    Until all are there; sooner where the phase would end before that.
+    Until all are there, after five times at most; sooner where the phase would end before that.
     """
 
     first: int
@@ -45,7 +46,7 @@ class Growth:
 
     def count(self, step: int, steps: int, full: int) -> int:
         """How many layers of `full` there are to be at this step of a phase of so many."""
-        first = max(1, min(self.first, full // 2))
+        first = max(1, min(self.first, full // 2), full >> DOUBLINGS)
         doublings = max(0, math.ceil(math.log2(full / first)))
         every = min(self.every, steps // (doublings + 1))
         return full if step >= doublings * every else first << step // every
