@@ -388,7 +388,9 @@ def test_all_layers_are_there_before_a_phase_ends(steps, full):
     counts = [Growth(4, 30).count(step, steps, full) for step in range(steps)]
     assert counts == sorted(counts)
     assert counts[-1] == full
-    assert counts[0] == (full if steps == 1 or (full > 8 and steps == 3) else max(min(4, full // 2), full // 32))
+    assert counts[0] == (
+        full if steps == 1 or (full > 8 and steps == 3) else max(min(4, full // 2), full // 32)
+    )
 
 
 @pytest.mark.usefixtures("kernels_there")
