@@ -33,7 +33,6 @@ LARGER = 0.7  # of a size limit: where the finest small drawing takes more, othe
 SURE = (
     0.985  # of a size limit: what keeps within this keeps within the limit when its numbers are fitted again
 )
-ASTRAY = 1.0  # dB that a coarse drawing loses of the picture: a finer one does not go on from it
 ABOUT = 1.03  # of a size limit, that a drawing which is still to be fitted may seem to take
 
 WASTED = 0.15  # dB that rounded numbers may lose of the picture
@@ -217,7 +216,7 @@ class Exports:
     def _fit_small(self, scene: Scene, grain: Grain) -> Scene:
         """The scene nearest to the picture that a drawing of this grain can say."""
         coarser = self._drawn(scene, USUAL[0]) if grain in USUAL[1:] else None
-        if coarser and self._lost_by(scene, coarser) > ASTRAY:
+        if coarser and self._lost_by(scene, coarser) > LITTLE:
             coarser = None
         with self._phase("fit drawing"):
             return _drawable(scene, self._views, grain, coarser)

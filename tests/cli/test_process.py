@@ -69,7 +69,7 @@ def test_interruption_at_a_terminal(folder, number):
     # The summary is on standard output though the bar was on the terminal.
     assert re.match(r"noise\.png: 200 x 200, \d+ shapes, PSNR .* dB, .* fitted in .* s, stopped early\n", out)
     assert names(folder) == ["noise.glsl", "noise.png", "noise.scene.json", "photo.jpg"]
-    assert sdf2vec.load(folder / "noise.scene.json").shape_count == 64
+    assert sdf2vec.load(folder / "noise.scene.json").shape_count in (16, 32, 64)
     assert (folder / "noise.glsl").read_text().endswith("}\n")
 
 
