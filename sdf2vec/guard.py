@@ -51,14 +51,19 @@ def _status_of(work: Callable[[list[str]], int], arguments: list[str]) -> int:
     with warnings.catch_warnings():
         warnings.showwarning = _warn
         try:
-            status = work(arguments)
-            sys.stdout.flush()
-            return status
-        except Exception as error:
-            return report(error)
+            return _reported(work, arguments)
         except KeyboardInterrupt as error:
             complain("interrupted")
             return error.args[0] if error.args else INTERRUPTED
+
+
+def _reported(work: Callable[[list[str]], int], arguments: list[str]) -> int:
+    try:
+        status = work(arguments)
+        sys.stdout.flush()
+        return status
+    except Exception as error:
+        return report(error)
 
 
 def _status_of_output() -> int:
@@ -133,7 +138,7 @@ def _bug(error: Exception) -> str:
 def complain(message: str) -> None:
     """One line on standard error."""
     try:
-        print(f"sdf2vec: {one_line(message)}", file=sys.stderr)
+        sys.stderr.write(f"sdf2vec: {one_line(message)}\n")  # at once: what runs beside it writes there, too
     except OSError:  # nobody listens
         return
 

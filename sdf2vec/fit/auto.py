@@ -49,11 +49,8 @@ UNLIKELY = 1.5  # of the most shapes: a picture that needs more is no drawing
 SOFT_MOST = 16  # shapes of a soft drawing
 GOOD = 10**-3.5  # mean squared error, 35 dB, of what is surely found
 DOMINANT = 0.15  # share of the most common colour, of a picture that has a ground
-MORE = (
-    2,
-    4,
-    12,
-)  # times the shapes found that are fitted where these alone are not the drawing; then, as many as allowed
+# times the shapes found that are fitted where these alone are not the drawing; then, as many as allowed
+MORE = 2, 4, 12
 TRIES = 4  # fits for a target
 
 

@@ -40,13 +40,10 @@ JOIN_STEPS = 350  # about, of one try to join a shape to a layer
 TRIAL_LAYERS, TRIAL_STEPS, TRIAL_RATE = 4, 60, 0.5
 REFIT_STEPS = 100  # after the colours have been restricted
 ANYWHERE = Start("uniform")
-IDLE, MOST_IDLE = (
-    0.1,
-    4,
-)  # layers do less than this share of what each would have to do; that are moved at once
-restrict_colors: Callable[..., None] = deferred(
-    "sdf2vec.fit.palette", "restrict"
-)  # scipy: most fits don't need it
+IDLE = 0.1  # layers do less than this share of what each would have to do
+MOST_IDLE = 4  # of them are moved at once
+# scipy: most fits don't need it
+restrict_colors: Callable[..., None] = deferred("sdf2vec.fit.palette", "restrict")
 LEAST_ERROR = 1e-8  # mean squared, of a pilot: 80 dB
 SAME_SHAPE = 0.01  # scene units by which a start scene's canvas may differ
 

@@ -17,9 +17,7 @@ RUNS_AWAY = 1.5  # times the least loss kept; at the presets' rates, 1.1 was the
 MATTERS = 0.1  # of a bare ground's loss: what is below it may rise and fall
 HARDLY_SEEN = 0.03  # of white, by which all pixels are off: what is below that loss may, too
 SLOWER = 0.5
-AGREES = (
-    0.15  # cosine; at the presets' rates, 24 shapes and more never reached it, at a third of them all did
-)
+AGREES = 0.15  # cosine; at the presets' rates 24 shapes and more never reached it, at a third of them all did
 LATELY = 0.1  # share of the present step in what is known of the agreement
 LONGER, LONGEST = 1.05, 10.0  # factors on the rates
 SAID = 4  # steps taken back that are worth a word: the first with few shapes often is

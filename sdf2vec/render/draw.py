@@ -16,9 +16,8 @@ from . import fused, reference
 from .tensors import SceneTensors, from_scene
 
 LARGE = 1 << 25  # layers × pixels from which compiling kernels pays for what is drawn once
-PART = (
-    1 << 22
-)  # shapes × pixels, with derivatives, while kernels compile: for a sort of layers, and each shape in it
+# shapes × pixels, with derivatives, while kernels compile: for a sort of layers, and each shape in it
+PART = 1 << 22
 GLANCE = 256  # shortest side, in pixels, at most
 GLANCES = 16  # of a scene, about, while its numbers are rounded
 
