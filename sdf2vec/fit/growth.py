@@ -13,10 +13,14 @@ import torch
 from ..blend import COMPOSITING
 from ..render.tensors import Group, SceneTensors
 from .adam import Adam
-from .initialization import Layers, Places, groups_at, straight
+from .initialization import Layers, Places, groups_at, place, straight
 from .matching_pursuit import canvas_of, find_discs
+from .presets import Start
 
 PROBES = 8  # random images that estimate what a layer does to the picture
+ANYWHERE = Start("uniform")
+IDLE = 0.1  # layers do less than this share of what each would have to do
+MOST_IDLE = 4  # of them are moved at once
 ROOM = 0.8  # size of a new shape, in radii of the disc whose place it takes: its falloff lies outside of that
 
 
@@ -61,6 +65,19 @@ def _linear_in(group: Group, tensors: SceneTensors) -> list[torch.Tensor]:
     return [tensor for tensor in found if tensor.requires_grad]
 
 
+def idle(
+    scores: Sequence[torch.Tensor],
+    image: torch.Tensor,
+    target: torch.Tensor,
+    weights: torch.Tensor | None = None,
+) -> int:
+    """How many layers do next to nothing for an image, beside what it lacks of its target; few at a time."""
+    flat = torch.cat(list(scores))
+    lacking = image.detach() - target
+    missing = float((lacking if weights is None else lacking * weights).square().sum())
+    return min(int((flat < IDLE * missing / len(flat)).sum()), MOST_IDLE)
+
+
 def prune(scores: Sequence[torch.Tensor], count: int) -> list[torch.Tensor]:
     """For each group, the rows that stay when the `count` layers with the lowest scores go."""
     flat = torch.cat(list(scores))
@@ -92,6 +109,38 @@ def densify(
     else:
         colors = straight(found.colors)
     return groups_at(Places(centers, sizes, colors), layers, generator, first=tensors.layer_count)
+
+
+def anywhere(
+    target: torch.Tensor, count: int, tensors: SceneTensors, layers: Layers, generator: torch.Generator
+) -> list[Group]:
+    """New layers on top of all others, at random, in the colours of a picture [C, H, W]."""
+    groups = place(target.cpu(), tensors.size, layers, count, ANYWHERE, generator).groups
+    for group in groups:
+        group.order += tensors.layer_count
+    return groups
+
+
+def add(
+    tensors: SceneTensors,
+    optimizer: Adam,
+    image: torch.Tensor,
+    target: torch.Tensor,
+    count: int,
+    layers: Layers,
+    generator: torch.Generator,
+    weights: torch.Tensor | None = None,
+) -> None:
+    """New layers where they help most (see `densify`); anywhere, when none would help. In place."""
+    full = tensors.layer_count + count
+    _append(tensors, optimizer, densify(image, target, count, tensors, layers, generator, weights))
+    rest = full - tensors.layer_count
+    if rest > 0:
+        _append(tensors, optimizer, anywhere(target, rest, tensors, layers, generator))
+
+
+def _append(tensors: SceneTensors, optimizer: Adam, fresh: Sequence[Group]) -> None:
+    exchange(tensors, optimizer, [torch.arange(len(group)) for group in tensors.groups], fresh)
 
 
 def relocate(

@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import dataclass, replace
 from functools import cached_property, partial
+from operator import itemgetter
 
 import torch
 
@@ -21,14 +22,14 @@ from .adam import Adam, adam_over
 from .backends import Backend, choose
 from .best import Best, faded, mean_color, nearest_of_its_own
 from .constraints import enforce_min_thickness, project, too_small
-from .growth import densify, exchange, importance, prune, relocate
+from .growth import add, anywhere, densify, exchange, idle, importance, prune, relocate
 from .initialization import Layers, background_of, empty_groups, place, tell_apart
 from .joining import RESOLUTIONS as JOIN_RESOLUTIONS
 from .joining import Search, join
 from .losses import Objective, objective
 from .pilots import PHASE as PILOT
 from .pilots import pilot_preset, pilot_settings, shares_of
-from .presets import MSE, Phase, Preset, Start
+from .presets import MSE, Phase, Preset
 from .settings import Settings, preset_of
 from .steady import Steady, small_loss
 from .surroundings import View
@@ -39,9 +40,6 @@ AREA_WEIGHT = 1.0  # of the area constraint in the loss
 JOIN_STEPS = 350  # about, of one try to join a shape to a layer
 TRIAL_LAYERS, TRIAL_STEPS, TRIAL_RATE = 4, 60, 0.5
 REFIT_STEPS = 100  # after the colours have been restricted
-ANYWHERE = Start("uniform")
-IDLE = 0.1  # layers do less than this share of what each would have to do
-MOST_IDLE = 4  # of them are moved at once
 # scipy: most fits don't need it
 restrict_colors: Callable[..., None] = deferred("sdf2vec.fit.palette", "restrict")
 LEAST_ERROR = 1e-8  # mean squared, of a pilot: 80 dB
@@ -109,15 +107,17 @@ class Fit:
         self.pixel = 1.0 / min(self.sides)
         self.size = (picture.width * self.pixel, picture.height * self.pixel)
         self.wanted = settings.most // settings.union  # layers
+        self.starts = 1 if settings.start is not None else self.preset.starts(self.wanted)
         self.done, self.steps, self.stopped = 0, self._count_steps(), False
         self.layers = Layers(
             settings.kinds, settings.compositing, settings.union, settings.paint, self._shares()
         )
-        self.tensors = self._start()
+        self._begin()
         self._announce_compiling()
-        self.tensors = on_device(self.tensors, self.backend.device)
-        self.optimizer = self._adam()
-        self.steady = Steady()
+
+    def _begin(self) -> None:
+        self.tensors = on_device(self._start(), self.backend.device)
+        self.optimizer, self.steady = self._adam(), Steady()
 
     @property
     def phases(self) -> tuple[Phase, ...]:
@@ -148,6 +148,9 @@ class Fit:
         """All phases and trials."""
         for phase in self.phases:
             stage = self.finest if phase is self.phases[-1] else self._stage(phase)
+            if phase is self.phases[0] and self.starts > 1:
+                self._train_starts(stage)
+                continue
             for batch in range(phase.batches):
                 if phase.batches == 1:
                     self._train(stage)
@@ -158,6 +161,18 @@ class Fit:
             self._try(stage)
         if self.settings.cuts:
             self._join(stage)
+
+    def _train_starts(self, stage: Stage) -> None:
+        """A phase from several starts, of which the nearest goes on."""
+        ended: list[tuple[float, SceneTensors, Adam, Steady]] = []
+        for number in range(self.starts):
+            if number:
+                self._begin()
+            try:
+                self._train(stage)
+            finally:  # also when stopped
+                ended.append((self._loss(stage), self.tensors, self.optimizer, self.steady))
+                _, self.tensors, self.optimizer, self.steady = min(ended, key=itemgetter(0))
 
     @cached_property
     def finest(self) -> Stage:
@@ -196,6 +211,7 @@ class Fit:
 
     def _count_steps(self) -> int:
         steps = sum(phase.total for phase in self.phases) + len(self._pilots) * PILOT.steps
+        steps += (self.starts - 1) * self.phases[0].total
         steps += self.settings.trials * TRIAL_STEPS + self.settings.cuts * JOIN_STEPS
         return steps + (REFIT_STEPS if self.settings.palette or self.settings.colors else 0)
 
@@ -229,32 +245,7 @@ class Fit:
         count = (self.settings.most - tensors.shape_count) // self.settings.union
         if count > 0:
             image = fused.composite(tensors, target.shape[2], target.shape[1], len(target))
-            self._add(tensors, optimizer, image, target, count)
-
-    def _add(
-        self,
-        tensors: SceneTensors,
-        optimizer: Adam,
-        image: torch.Tensor,
-        target: torch.Tensor,
-        count: int,
-        weights: torch.Tensor | None = None,
-    ) -> None:
-        """New layers where they help most; anywhere, when none would help."""
-        layers, full = self.layers, tensors.layer_count + count
-        _join_groups(
-            tensors, optimizer, densify(image, target, count, tensors, layers, self.generator, weights)
-        )
-        rest = full - tensors.layer_count
-        if rest > 0:
-            _join_groups(tensors, optimizer, self._anywhere(target.cpu(), rest, tensors.layer_count))
-
-    def _anywhere(self, target: torch.Tensor, count: int, first: int) -> list[Group]:
-        """New layers anywhere, in the picture's colours, their draw order beginning with `first`."""
-        groups = place(target, self.size, self.layers, count, ANYWHERE, self.generator).groups
-        for group in groups:
-            group.order += first
-        return groups
+            add(tensors, optimizer, image, target, count, self.layers, self.generator)
 
     def _announce_compiling(self) -> None:
         if not self.backend.is_compiled(self.tensors, self.pixels.shape[2]):
@@ -373,7 +364,7 @@ class Fit:
         image = self._draw(self.tensors, stage.target)
         loss = float(stage.measure(image).detach())
         scores = self._scores(image, stage)
-        fresh = self._anywhere(stage.target.cpu(), count, self.tensors.layer_count)
+        fresh = anywhere(stage.target, count, self.tensors, self.layers, self.generator)
         relocate(self.tensors, self.optimizer, scores, fresh)
         first = self.tensors.layer_count - count
         phase = Phase("trial", TRIAL_STEPS, stage.phase.resolution, rate=TRIAL_RATE, end_rate=0.05)
@@ -427,9 +418,8 @@ class Fit:
         self._settle(stage)
         image = self._draw(self.tensors, stage.target)
         scores = self._scores(image, stage)
-        count = min(
-            max(round(share * self.tensors.layer_count), _idle(scores, image, stage)), self._replaceable
-        )
+        resting = idle(scores, image, stage.target, stage.weights)
+        count = min(max(round(share * self.tensors.layer_count), resting), self._replaceable)
         if count == 0:
             return
         layers = self.layers
@@ -442,7 +432,16 @@ class Fit:
         if count > 0:
             self._settle(stage)
             image = self._draw(self.tensors, stage.target)
-            self._add(self.tensors, self.optimizer, image, stage.target, count, stage.weights)
+            add(
+                self.tensors,
+                self.optimizer,
+                image,
+                stage.target,
+                count,
+                self.layers,
+                self.generator,
+                stage.weights,
+            )
             self.optimizer = self._adam().remembers(self.optimizer)
 
     @property
@@ -457,17 +456,6 @@ class Fit:
             score if len(group.structure) == self.settings.union else torch.full_like(score, math.inf)
             for score, group in zip(scores, self.tensors.groups, strict=True)
         ]
-
-
-def _idle(scores: Sequence[torch.Tensor], image: torch.Tensor, stage: Stage) -> int:
-    """How many layers do next to nothing for the picture, beside what is missing of it; few at a time."""
-    flat = torch.cat(list(scores))
-    missing = float((image.detach() - stage.target).square().sum())
-    return min(int((flat < IDLE * missing / len(flat)).sum()), MOST_IDLE)
-
-
-def _join_groups(tensors: SceneTensors, optimizer: Adam, fresh: list[Group]) -> None:
-    exchange(tensors, optimizer, [torch.arange(len(group)) for group in tensors.groups], fresh)
 
 
 def _check_start(scene: Scene, size: tuple[float, float]) -> None:

@@ -12,6 +12,10 @@ Loss = tuple[tuple[str, float], ...]  # name in `losses.LOSSES`, weight
 MANY = 256  # shapes beyond which the phases' resolution grows
 SOFTEST = 1.5  # falloff of any shape, in scene units
 DOUBLINGS = 5  # of the number of layers, at most: 2048 that began with 16 ended farther from the picture
+STARTS, SCARCE = (
+    4,
+    64,
+)  # starts that are tried, at most; and times the layers: below, chance decides how near they come
 CROWDING = 0.35  # rates of layers fall with this power of their number
 
 L1: Loss = (("l1", 1.0),)
@@ -119,6 +123,10 @@ class Preset:
         if not self.sharpens or phase.resolution < 1:
             return phase.resolution
         return phase.resolution * math.sqrt(math.sqrt(max(1.0, shapes / MANY)))
+
+    def starts(self, layers: int) -> int:
+        """From how many starts the first phase is tried: what few layers find is much of it chance."""
+        return max(1, min(STARTS, SCARCE // max(1, layers))) if self.phases[0].growth else 1
 
     @property
     def steps(self) -> int:

@@ -155,6 +155,8 @@ def test_a_full_disk_leaves_nothing_behind(folder, run, monkeypatch):
     def full(*_):
         raise OSError(28, "No space left on device")
 
+    assert run("photo.jpg", *SHORT, "-o", "first.svg").code == 0  # so that no kernel is left to be kept
+    (folder / "first.svg").unlink()
     monkeypatch.setattr("os.fsync", full)
     outcome = run("photo.jpg", *SHORT)
     assert outcome.code == 2

@@ -12,9 +12,9 @@ from sdf2vec.blend import COMPOSITING
 from sdf2vec.fit import backends, constraints, loop, losses
 from sdf2vec.fit.adam import adam_over
 from sdf2vec.fit.initialization import Layers, detail, place
-from sdf2vec.fit.loop import Progress, fit_picture
-from sdf2vec.fit.presets import PRESETS, Start
-from sdf2vec.fit.settings import Settings
+from sdf2vec.fit.loop import Fit, Progress, fit_picture
+from sdf2vec.fit.presets import Start
+from sdf2vec.fit.settings import Settings, settings_of
 from sdf2vec.fit.views import scaled
 from sdf2vec.layer import Part
 from sdf2vec.metrics import mse, psnr
@@ -22,7 +22,7 @@ from sdf2vec.render import culled, kernels, triton_fused
 from sdf2vec.render.reference import render
 from sdf2vec.render.tensors import from_scene
 from sdf2vec.shapes import KINDS
-from tests.fit.fitting import as_tensor, picture, remember
+from tests.fit.fitting import as_tensor, busy, error, fitted, picture, remember
 from tests.scenes import random_scene
 
 
@@ -101,9 +101,45 @@ def test_progress_and_stopping():
 
     scene = fit_picture(picture(), Settings(4, ("box",), preset="fast"), callback)
     assert [p.step for p in seen] == list(range(1, 8))
-    assert {p.steps for p in seen} == {PRESETS["fast"].steps}
+    assert {p.steps for p in seen} == {4 * 240 + 140}  # the first phase from four starts
     assert all(math.isfinite(p.loss) for p in seen)
     assert scene.shape_count == 2  # it begins with half of them
+
+
+@pytest.mark.parametrize(("shapes", "starts"), [(1, 4), (16, 4), (24, 2), (32, 2), (64, 1), (1024, 1)])
+def test_few_shapes_are_tried_from_several_starts(shapes, starts):
+    assert Fit(picture(), settings_of(shapes, kind="circle", preset="fast"), lambda _: True).starts == starts
+    assert Fit(picture(), settings_of(shapes, kind="circle", preset="thesis"), lambda _: True).starts == 1
+
+
+def first_phase(pic, until, **options):
+    """The scene after so many steps of the first phase, and the squared error at the end of each start."""
+    errors = []
+
+    def callback(progress):
+        if progress.step % 240 == 0:
+            errors.append(error(progress.scene(), pic))
+        return progress.step == until
+
+    return fitted(pic, 6, callback, **options), errors
+
+
+def test_the_nearest_start_goes_on():
+    """Whichever of four it is: for one seed at least, not the last."""
+    last = 0
+    for seed in range(4):
+        scene, errors = first_phase(busy(), 960, seed=seed, loss="mse")
+        assert len(errors) == 4 == len(set(errors))
+        assert error(scene, busy()) == pytest.approx(min(errors), rel=0.02)
+        last += min(errors) == errors[-1]
+    assert last < 4
+
+
+def test_a_fit_stopped_in_its_second_start_keeps_the_first():
+    first, errors = first_phase(busy(), 240, loss="mse")
+    scene, _ = first_phase(busy(), 243, loss="mse")
+    assert scene == first
+    assert error(scene, busy()) == pytest.approx(errors[0], rel=0.02)
 
 
 @pytest.mark.parametrize("size", [(1, 1), (1, 500), (37, 2)])
