@@ -25,9 +25,9 @@ Share = Callable[[Scene], float]  # of a size limit, above 1 for what is too lar
 PROBED = 16, 64  # shapes of each sort that are tried first: as many as may be needed, or a quarter of them
 ENOUGH = 0.945  # of the limit, that is to be used
 FITS = 3  # of full length, at most
-CHANCY = (
-    64  # shapes, up to which other seeds come to something else by some tenths of a dB: all fits are made
-)
+# shapes, up to which other seeds come to something else by some tenths of a dB, and probes are no nearer: all fits
+CHANCY = 64  # are made, of the most promising sorts
+NEAREST = 2  # of these
 SLOPE = 1.7  # dB for twice the shapes, about
 RESOLUTION = 128  # pixels squared, where it is seen which shapes matter least
 
@@ -48,21 +48,23 @@ def within(picture: Picture, settings: Settings, share: Share, callback: Callbac
     best, near = (nothing, empty), psnr_of(nothing, picture)
     if empty >= 1.0:
         return best
-    chosen = max(_probes(picture, settings, share, callback), key=lambda probe: probe.hoped)
-    count = chosen.wanted
-    for number in range(FITS):
-        again = structs.replace(chosen.settings, shapes=count, seed=settings.seed + number)
-        scene = fit_concisely(picture, again, callback)
-        taken = share(scene)
-        each = (taken - empty) / count
-        scene, taken = _trimmed(scene, view, share, each, taken)
-        if (now := psnr_of(scene, picture)) > near:
-            best, near = (scene, taken), now
-        more = min(math.floor((1.0 - empty) / each), settings.most)
-        is_full = taken >= ENOUGH or more <= count
-        if is_full and count > CHANCY:
-            break
-        count = count if is_full else more
+    probes = sorted(_probes(picture, settings, share, callback), key=lambda probe: -probe.hoped)
+    chancy = probes[0].wanted <= CHANCY
+    for probe in probes[: NEAREST if chancy else 1]:
+        count = probe.wanted
+        for number in range(FITS):
+            again = structs.replace(probe.settings, shapes=count, seed=settings.seed + number)
+            scene = fit_concisely(picture, again, callback)
+            taken = share(scene)
+            each = (taken - empty) / count
+            scene, taken = _trimmed(scene, view, share, each, taken)
+            if (now := psnr_of(scene, picture)) > near:
+                best, near = (scene, taken), now
+            more = min(math.floor((1.0 - empty) / each), settings.most)
+            is_full = taken >= ENOUGH or more <= count
+            if is_full and not chancy:
+                break
+            count = count if is_full else more
     return best
 
 
