@@ -48,7 +48,10 @@ SAME_SHAPE = 0.01  # scene units by which a start scene's canvas may differ
 
 @dataclass(frozen=True)
 class Progress:
-    """Where a fit stands, and on which device; `step` counts over all phases. `scene()` is the scene as it is now."""
+    """Where a fit stands, and on which device; `step` counts over all phases.
+
+    `scene()` is the scene as it is now; while a later start is under way, the nearest of those that have ended.
+    """
 
     phase: str
     step: int
@@ -109,6 +112,7 @@ class Fit:
         self.wanted = settings.most // settings.union  # layers
         self.starts = 1 if settings.start is not None else self.preset.starts(self.wanted)
         self.done, self.steps, self.stopped = 0, self._count_steps(), False
+        self.nearest: SceneTensors | None = None  # of the starts that have ended, while a later one is under way
         self.layers = Layers(
             settings.kinds, settings.compositing, settings.union, settings.paint, self._shares()
         )
@@ -126,8 +130,8 @@ class Fit:
         return phases if self.settings.start is None or len(phases) == 1 else phases[1:]
 
     def scene(self) -> Scene:
-        """The scene as it is now."""
-        return to_scene(self.tensors, *self.sides)
+        """The scene as it is now; while a later start is under way, the nearest of those that have ended."""
+        return to_scene(self.nearest or self.tensors, *self.sides)
 
     def run(self) -> None:
         """The whole fit, in place. Also when it is stopped, no shape stays too thin and colours are restricted."""
@@ -167,10 +171,12 @@ class Fit:
         ended: list[tuple[float, SceneTensors, Adam, Steady]] = []
         for number in range(self.starts):
             if number:
+                self.nearest = self.tensors
                 self._begin()
             try:
                 self._train(stage)
             finally:  # also when stopped
+                self.nearest = None
                 ended.append((self._loss(stage), self.tensors, self.optimizer, self.steady))
                 _, self.tensors, self.optimizer, self.steady = min(ended, key=itemgetter(0))
 

@@ -118,7 +118,7 @@ def first_phase(pic, until, **options):
 
     def callback(progress):
         if progress.step % 240 == 0:
-            errors.append(error(progress.scene(), pic))
+            errors.append(progress.loss)  # of the start under way, of which there may be a nearer one
         return progress.step == until
 
     return fitted(pic, 6, callback, **options), errors
