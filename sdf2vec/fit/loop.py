@@ -112,7 +112,8 @@ class Fit:
         self.wanted = settings.most // settings.union  # layers
         self.starts = 1 if settings.start is not None else self.preset.starts(self.wanted)
         self.done, self.steps, self.stopped = 0, self._count_steps(), False
-        self.nearest: SceneTensors | None = None  # of the starts that have ended, while a later one is under way
+        # of the starts that have ended, while a later one is under way
+        self.nearest: SceneTensors | None = None
         self.layers = Layers(
             settings.kinds, settings.compositing, settings.union, settings.paint, self._shares()
         )
