@@ -26,7 +26,7 @@ from .options import Options
 from .page_texts import PageTexts
 from .raster import png
 from .records import Form, Variant, form_of
-from .script import BEARS_ITS_OWN, script_parts
+from .script import script_parts
 from .shader import most_shapes
 from .svg import svg
 
@@ -36,8 +36,17 @@ SLOPE, NEAREST = 32.0, 105.0  # fewer can have more: by ten times fewer, and at 
 POLICY = "what the page may do"  # where the template has it
 SCRIPT = re.compile(r'<script type="module">(.*?)</script>', re.DOTALL)
 STYLE = re.compile(r"<style>(.*?)</style>", re.DOTALL)
+CHECK = re.compile(r"^ *(?:require|oneOf)\(.*\);\n", re.MULTILINE)  # of files: a page's own needs none
 REMARK = re.compile(r"(^|[ \t])[ \t]*// .*$", re.MULTILINE)
-SPACE = re.compile(r"^[ \t]*\n|^[ \t]+|[ \t]+$", re.MULTILINE)
+BLANK = re.compile(r"\n\s*\n")
+FILLED = r"\$\{(?:[^`{}]|`[^`]*`)*\}"  # in a template, with templates in it
+TOKEN = re.compile(
+    rf"""(?P<kept>"(?:\\.|[^"\\])*"|`(?:{FILLED}|\\.|[^`\\])*`|(?<=[+])\ (?=[+])|(?<=-)\ (?=-)|\n(?=\w))
+    |\s+(?=[^\w$])|(?<=[^\w$])\s+""",
+    re.VERBOSE,
+)
+TAG = re.compile(r"<(?=[/!?a-zA-Z])")
+ESCAPE = re.compile(r"\\.")
 LABELS = {"shadertoy": "Shadertoy", "glsl": "GLSL", "wgsl": "WGSL", "svg": "SVG"}
 
 
@@ -58,13 +67,13 @@ def html(scene: Scene, options: Options) -> Exported:
         labels={
             name: label for name, label in LABELS.items() if name in served or (name == "svg" and drawing)
         },
-        texts=json.dumps(texts.texts, ensure_ascii=False).replace("<", "\\u003c"),
+        texts=_in_lines(texts.texts),
         file=base64.b64encode(file).decode(),
         places="\n".join(texts.functions),
         policy=POLICY,
-        **script_parts([_form(held)], BEARS_ITS_OWN),
+        **script_parts([_form(held)], own=True),
     )
-    text = SCRIPT.sub(lambda match: f'<script type="module">{_lean(match[1])}</script>', text)
+    text = SCRIPT.sub(lambda match: f'<script type="module">{lean(match[1])}</script>', text)
     return Exported(text.replace(POLICY, policy_of(text), 1))
 
 
@@ -78,9 +87,19 @@ def _form(scene: Scene) -> Form:
     return form_of(scene) if scene.layers else Form((Variant("circle"),), (), scene.compositing)
 
 
-def _lean(script: str) -> str:
-    """A script without remarks, indents and empty lines."""
-    return SPACE.sub("", REMARK.sub("", script))
+def lean(script: str) -> str:
+    """A script without remarks, checks of its scene, and what else only sets it off.
+
+    Shaders in it keep their lines: so gzip finds them alike to those in the texts.
+    """
+    plain = BLANK.sub("\n", REMARK.sub("", CHECK.sub("", script)))
+    return TOKEN.sub(lambda match: match["kept"] or "", plain)
+
+
+def _in_lines(texts: object) -> str:
+    """JSON that can't end a script, its line breaks as they are: so lines of texts and of the script are alike."""
+    said = json.dumps(texts, ensure_ascii=False, separators=(",", ":"))
+    return ESCAPE.sub(lambda match: "\n" if match[0] == "\\n" else match[0], TAG.sub("\\\\u003c", said))
 
 
 def policy_of(page: str) -> str:

@@ -100,7 +100,7 @@ class Sort:
     @property
     def function(self) -> str:
         """The same in JavaScript."""
-        return function_text(f"PLACES[{self.key!r}]", self.used, self.inputs).removeprefix("const ")
+        return function_text(f'PLACES["{self.key}"]', self.used, self.inputs).removeprefix("const ")
 
 
 @dataclass(frozen=True)

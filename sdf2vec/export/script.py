@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Sequence
 
 from .. import compact_file, entropy
 from ..blend import FRAMINGS, JOINS, OVER, display, grid_point, union_reach
@@ -27,24 +27,29 @@ SLACK = var("slack")
 
 # What a page bears of files from anywhere: bytes, layers, entries of its lists in all and in a cell, cells.
 BEARS = {"bytes": 1 << 26, "layers": 1 << 14, "listed": 1 << 21, "deep": 1 << 12, "cells": 1 << 16}
-BEARS_ITS_OWN = BEARS | {"layers": MAX_SHAPES, "listed": 1 << 26, "deep": MAX_SHAPES}
+BEARS_ITS_OWN = BEARS | {"listed": 1 << 26}
 
 
-def script_parts(forms: Sequence[Form], bears: Mapping[str, int] = BEARS) -> dict[str, object]:
-    """What `scene.js.jinja` takes for scenes of these forms, which differ in nothing but the compositing."""
+def script_parts(forms: Sequence[Form], own: bool = False) -> dict[str, object]:
+    """What `scene.js.jinja` takes for scenes of these forms, which differ in nothing but the compositing.
+
+    `own`: for a page that holds its scene, as this program has written it; checks of files are left out there.
+    """
     form = forms[0]
     kinds = {variant.kind: KINDS[variant.kind] for variant in form.variants}
     paints = {variant.paint: PAINTS[variant.paint] for variant in (*form.variants, Variant("", FLAT))}
     joins = form.joins or tuple(JOINS)[:1]
+    told = _needed if own else _told
     return {
-        "kinds": _json({name: list(map(_told, kind.parameters)) for name, kind in kinds.items()}),
-        "paints": _json({name: list(map(_told, paint.parameters)) for name, paint in paints.items()}),
-        "look": _json(list(map(_told, LOOK))),
-        "join": _json(_told(JOIN)),
-        "ground": _json(_told(GROUND)),
-        "sheer": _json(_told(SHEER)),
+        "own": own,
+        "kinds": _json({name: list(map(told, kind.parameters)) for name, kind in kinds.items()}),
+        "paints": _json({name: list(map(told, paint.parameters)) for name, paint in paints.items()}),
+        "look": _json(list(map(told, LOOK))),
+        "join": _json(told(JOIN)),
+        "ground": _json(told(GROUND)),
+        "sheer": _json(told(SHEER)),
         "patches": _json([name for name, kind in kinds.items() if kind.patch is not None]),
-        "bears": _json(bears),
+        "bears": BEARS_ITS_OWN if own else BEARS,
         "most_pixels": CANVAS_SIDE,
         "most_shapes": MAX_SHAPES,
         "most_joined": MAX_JOINED,
@@ -65,17 +70,16 @@ def script_parts(forms: Sequence[Form], bears: Mapping[str, int] = BEARS) -> dic
 
 def _told(parameter: Parameter) -> dict[str, object]:
     """What a script must know of a parameter to check the numbers of a file."""
-    unit = parameter.unit
-    told = {
-        "name": parameter.name,
-        "unit": unit.name,
-        "width": parameter.width,
-        "low": int(unit.low),
-        "high": int(unit.high),
-    }
     usual = {"usual": parameter.values_from(parameter.start)} if parameter in OPTIONAL else {}
-    positive = {"positive": True} if parameter.positive else {}
-    return told | positive | ({"light": True} if unit in (COLOR, OPACITY) else {}) | usual
+    light = {"light": True} if parameter.unit in (COLOR, OPACITY) else {}
+    return {"name": parameter.name} | _needed(parameter) | light | usual
+
+
+def _needed(parameter: Parameter) -> dict[str, object]:
+    """What it must know to read the numbers of a compact file."""
+    unit = parameter.unit
+    told = {"unit": unit.name, "width": parameter.width, "low": int(unit.low), "high": int(unit.high)}
+    return told | ({"positive": True} if parameter.positive else {})
 
 
 def _compact_parts(variants: Iterable[Variant]) -> dict[str, object]:
