@@ -41,7 +41,7 @@ format: $(VENV)/.installed-test
 
 # Speed: the tables of docs/speed.md, on this machine; some minutes.
 bench: $(VENV)/.installed-test
-	$(BIN)/python -m sdf2vec.bench.speed -o docs/speed.md
+	$(BIN)/sdf2vec bench speed -o docs/speed.md
 
 # What the tests were run with, each file by its hash; `lock` finds it out anew (with uv), `locked` installs it.
 lock: $(VENV)/.torch

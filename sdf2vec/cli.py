@@ -293,14 +293,16 @@ def _cache_command(arguments: list[str]) -> int:
     return cached.command(_cache_parser().parse_args(arguments))
 
 
-def _bench_parser() -> argparse.ArgumentParser:
-    parser = _Parser(prog="sdf2vec bench", description=benching.ABOUT)
-    benching.add_choices(parser)
+def _bench_parser(name: str = "") -> argparse.ArgumentParser:
+    parser = _Parser(prog=f"sdf2vec bench {name}".rstrip())
+    benching.add_choices(parser, name)
     return parser
 
 
 def _bench_command(arguments: list[str]) -> int:
-    return benching.command(_bench_parser().parse_intermixed_args(arguments), arguments)
+    name = benching.name_in(arguments)
+    options = _bench_parser(name).parse_intermixed_args(arguments[1 if name else 0 :])
+    return benching.command(name, options, arguments)
 
 
 def _warm_up_command(arguments: list[str]) -> int:

@@ -17,7 +17,7 @@ from ..image import load
 from ..quality import psnr_of
 from ..shapes import KINDS
 from . import hard_pictures as pictures
-from .speed import picture, scene, seconds, step
+from .timing import picture, scene, seconds, step
 
 SHAPES = 8
 DROP = 0.3  # dB

@@ -1,7 +1,4 @@
-"""What so many bytes of an export can say of a picture, beside WebP's. Writes a table in Markdown.
-
-python -m sdf2vec.bench.byte_limits examples/coffee.png --limits 1250gz,4000,16000 -o docs/byte-limits.md
-"""
+"""What so many bytes of an export can say of a picture, beside WebP's."""
 
 from __future__ import annotations
 
@@ -9,25 +6,29 @@ import argparse
 import io
 import math
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
+from itertools import chain, product
 from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
-import torch
 from PIL import Image
 
 from .. import api
 from ..arrays import Float32Array
+from ..deferred import deferred
 from ..engines import ENGINES
+from ..errors import Sdf2vecError
 from ..export.byte_limit import ByteLimit, gzipped_size
-from ..files import write_atomically
-from ..flip import flip
 from ..image import Picture, load
-from ..roundtrip import ROUND_TRIPS
+from . import choices
+from .table import Asked, Page
 
-TARGETS = "svg,shadertoy"
-DRAWN = "resvg", "chromium", "opengl"  # by which engines, as far as a target has them
+drawn: Callable[..., dict[str, Float32Array]] = deferred("sdf2vec.bench.fits", "drawn")
+flip_of: Callable[[Float32Array, Picture], float] = deferred("sdf2vec.bench.fits", "flip_of")
+
+# By which engines most people see them.
+TARGETS = {"svg": ("resvg", "chromium"), "shadertoy": ("opengl",), "glsl": ("opengl",), "godot": ("opengl",)}
 SIDES = (12, 16, 24, 32, 48, 64, 96, 128, 192, 256)  # pixels along the longer one of a thumbnail
 QUALITIES = (1, 5, 10, 20, 35, 50, 75)
 
@@ -56,14 +57,9 @@ def measured(path: Path, target: str, limit: str, **options: Any) -> Row:
     scene = api.fitted(picture, share=share, **options).scene
     made = api.exported(scene, target, picture=picture, max_bytes=limit)
     seconds = time.process_time() - started
-    drawn = {
-        trip.engine: trip.draw(made, scene, picture.width, picture.height)
-        for trip in reversed(ROUND_TRIPS[target])
-        if trip.engine in DRAWN and not ENGINES[trip.engine].missing()
-    }
-    near = {engine: psnr(image[..., :3], picture.pixels[..., :3]) for engine, image in drawn.items()}
+    images = drawn(made, scene, target, _engines(target), picture)
+    near = {engine: psnr(image[..., :3], picture.pixels[..., :3]) for engine, image in images.items()}
     worst = min(near, key=near.__getitem__)
-    shown, seen = (_planes(image) for image in (drawn[worst], picture.pixels))
     return Row(
         path.name,
         target,
@@ -73,15 +69,18 @@ def measured(path: Path, target: str, limit: str, **options: Any) -> Row:
         scene.shape_count,
         worst,
         near[worst],
-        float(flip(shown, seen)),
+        flip_of(images[worst], picture),
         nearest_webp(picture, ByteLimit.of(limit).most),
         seconds,
     )
 
 
-def _planes(image: Float32Array) -> torch.Tensor:
-    """[3, H, W]"""
-    return torch.from_numpy(np.ascontiguousarray(image[..., :3].transpose(2, 0, 1), np.float32))
+def _engines(target: str) -> list[str]:
+    """Those that draw a target here. Raises Sdf2vecError where there is none."""
+    present = [engine for engine in TARGETS[target] if not ENGINES[engine].missing()]
+    if not present:
+        raise Sdf2vecError(f"{target}: {ENGINES[TARGETS[target][0]].missing()}")
+    return present
 
 
 def psnr(image: Float32Array, other: Float32Array) -> float:
@@ -106,57 +105,40 @@ def nearest_webp(picture: Picture, limit: int) -> float:
     return found
 
 
-def table(rows: list[Row], command: str) -> Iterator[str]:
-    """The page, line by line."""
-    yield from (
-        "# What so many bytes can say",
-        "",
-        f"    {command}",
-        "",
-        "Text as written with `--max-bytes` (`gz`: gzipped), drawn at the picture's size by resvg and Chromium, "
-        "whichever is worse, or by OpenGL; PSNR and FLIP against the picture. WebP: the nearest of several sizes and "
-        "qualities that is no larger than the limit, drawn large by bicubic interpolation.",
-        "",
-        "| picture | target | limit | bytes | gzipped | used | shapes | engine | PSNR dB | FLIP | WebP dB | CPU s |",
-        "|---|---|---:|---:|---:|---:|---:|---|---:|---:|---:|---:|",
+ABOUT = """Text as written with `--max-bytes` (`gz`: gzipped), drawn at the picture's size by resvg and Chromium, \
+whichever is worse, or by OpenGL; PSNR and FLIP against the picture. WebP: the nearest of several sizes and \
+qualities that is no larger than the limit, drawn large by bicubic interpolation."""
+HEAD = (
+    "| picture | target | limit | bytes | gzipped | used | shapes | engine | PSNR dB | FLIP | WebP dB | CPU s |",
+    "|---|---|---:|---:|---:|---:|---:|---|---:|---:|---:|---:|",
+)
+
+
+def line(row: Row) -> str:
+    """A row of the table."""
+    limit = ByteLimit.of(row.limit)
+    used = (row.zipped if limit.gzipped else row.raw) / limit.most
+    return (
+        f"| {row.picture} | {row.target} | {row.limit} | {row.raw:,} | {row.zipped:,} | {used:.0%} | {row.shapes} "
+        f"| {row.engine} | {row.psnr:.2f} | {row.flip:.4f} | {row.webp:.2f} | {row.seconds:.0f} |"
     )
-    for row in rows:
-        limit = ByteLimit.of(row.limit)
-        used = (row.zipped if limit.gzipped else row.raw) / limit.most
-        yield (
-            f"| {row.picture} | {row.target} | {row.limit} | {row.raw:,} | {row.zipped:,} | {used:.0%} | {row.shapes} "
-            f"| {row.engine} | {row.psnr:.2f} | {row.flip:.4f} | {row.webp:.2f} | {row.seconds:.0f} |"
-        )
 
 
-def main() -> None:
-    """Entry point of `python -m sdf2vec.bench.byte_limits`."""
-    parser = argparse.ArgumentParser(
-        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+def add_choices(parser: argparse.ArgumentParser) -> None:
+    """The flags of `sdf2vec bench byte-limits`."""
+    parser.add_argument("pictures", type=choices.picture, nargs="+", metavar="PICTURE")
+    choices.add_list(parser, "--limits", choices.limits, "1000,4000,16000", "bytes, or gzipped as 4000gz")
+    choices.add_list(
+        parser, "--targets", choices.names("target", TARGETS), "svg,shadertoy", "what is written"
     )
-    parser.add_argument("pictures", type=Path, nargs="+", metavar="PICTURE")
-    parser.add_argument("--limits", default="1000,4000,16000", help="bytes, or gzipped as 4000gz")
-    parser.add_argument("--targets", default=TARGETS)
-    parser.add_argument("--max-shapes", type=int, default=256)
-    parser.add_argument("--preset", default="balanced")
-    parser.add_argument("--seed", type=int, default=0)
-    parser.add_argument("-o", "--output", type=Path)
-    options = parser.parse_args()
-    rows = []
-    for path in options.pictures:
-        for target in options.targets.split(","):
-            for limit in options.limits.split(","):
-                given = {"preset": options.preset, "seed": options.seed, "max_shapes": options.max_shapes}
-                rows.append(measured(path, target, limit, **given))
-                print(rows[-1], flush=True)
-    names = " ".join(path.name for path in options.pictures)
-    command = (
-        f"python -m sdf2vec.bench.byte_limits {names} --limits {options.limits} --targets {options.targets} "
-        f"--preset {options.preset} --max-shapes {options.max_shapes}"
-    )
-    if options.output:
-        write_atomically(options.output, ("\n".join(table(rows, command)) + "\n").encode())
+    choices.add_fit(parser, "max_shapes", "preset", "seed")
 
 
-if __name__ == "__main__":
-    main()
+def pages(options: argparse.Namespace, asked: Asked) -> Iterator[Page]:
+    """One page: a row for each picture, target and limit."""
+    fit = choices.fit_of(options)
+    for target in options.targets:
+        _engines(target)
+    asks = product(options.pictures, options.targets, options.limits)
+    rows = (line(measured(*ask, **fit)) for ask in asks)
+    yield asked.page("What so many bytes can say", ABOUT, asked.told(chain(HEAD, rows)))

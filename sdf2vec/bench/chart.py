@@ -27,8 +27,8 @@ class Chart:
     dashed: tuple[str, ...] = ()
 
 
-def write(chart: Chart, path: Path) -> None:
-    """Writes a chart; the same numbers give the same file."""
+def drawn(chart: Chart) -> Figure:
+    """A chart as a figure; the same numbers give the same one."""
     figure = Figure(figsize=(7, 4.2), layout="constrained")
     axes = figure.add_subplot()
     for name, points in chart.lines.items():
@@ -41,7 +41,7 @@ def write(chart: Chart, path: Path) -> None:
         axes.minorticks_off()
     axes.grid(alpha=0.3)
     axes.legend(fontsize=8)
-    save(figure, path)
+    return figure
 
 
 def save(figure: Figure, path: Path) -> None:

@@ -1,20 +1,24 @@
-"""Fits for the benchmarks: one measured, or the median of several."""
+"""Fits for the benchmarks, measured; and exports as engines draw them, against the picture."""
 
 from __future__ import annotations
 
 import resource
 import time
+from collections.abc import Collection
 from typing import Any, NamedTuple
 
 import numpy as np
 import torch
 
+from ..arrays import Float32Array
+from ..export.exported import Exported
 from ..fit.loop import fit_picture
 from ..fit.settings import settings_of
 from ..flip import flip
 from ..image import Picture
 from ..metrics import psnr, ssim
 from ..render.draw import draw
+from ..roundtrip import ROUND_TRIPS
 from ..scene import Scene
 
 
@@ -45,15 +49,24 @@ def tensor_of(picture: Picture) -> torch.Tensor:
     return torch.from_numpy(np.ascontiguousarray(picture.premultiplied.transpose(2, 0, 1)))
 
 
-def median(fits: list[Fitted]) -> Fitted:
-    """The median of each figure."""
-    return Fitted(*np.median(np.array(fits), axis=0).tolist())
+def drawn(
+    made: Exported, scene: Scene, target: str, engines: Collection[str], picture: Picture
+) -> dict[str, Float32Array]:
+    """An export as each of these engines draws it at the picture's size, [H, W, 4]."""
+    return {
+        trip.engine: trip.draw(made, scene, picture.width, picture.height)
+        for trip in reversed(ROUND_TRIPS[target])  # of several forms the first one, which is the usual
+        if trip.engine in engines
+    }
 
 
-def warm_up(picture: Picture, **options: Any) -> None:
-    """Compiles the kernels, so that it isn't measured."""
-    measured(picture, 8, **(options | {"preset": "fast"}))
-    measured(picture, 8, **options)
+def flip_of(image: Float32Array, picture: Picture) -> float:
+    """FLIP of an opaque drawing."""
+    shown, seen = (
+        torch.from_numpy(np.ascontiguousarray(pixels[..., :3].transpose(2, 0, 1), np.float32))
+        for pixels in (image, picture.pixels)
+    )
+    return float(flip(shown, seen))
 
 
 def _cpu() -> float:

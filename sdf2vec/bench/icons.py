@@ -1,7 +1,5 @@
 """Icons made by others, fitted: shapes, numbers, bytes and error beside the artist's own and vtracer's.
 
-    python -m sdf2vec.bench.icons FOLDER -o docs/icons.md
-
 Any folder of SVG files will do; those of the npm packages `@twemoji/svg` and `flat-color-icons`, say, which
 `npm pack` brings.
 """
@@ -21,20 +19,24 @@ from .. import api
 from ..arrays import Float32Array
 from ..engines import resvg
 from ..engines.engine import EngineError
+from ..errors import Sdf2vecError
 from ..export.byte_limit import gzipped_size
-from ..files import write_atomically
+from ..fit.settings import AUTO
 from ..image import encode_png, premultiply
 from ..scene import Scene
+from . import choices
 from .peers import PEERS, drawn_by
 from .recovery import psnr
 from .svg_shapes import count_numbers, parsed, shapes_of
+from .table import Asked, Page
 
 ICONS = 100
 SIDE = 256  # pixels
 SHOWN = 8  # icons of the figure
+FIGURE = ".png"
 NEAR = 0.02  # ΔE00 that is no difference
-LIMIT = "max_bytes"
-GIVEN = ("kind", "preset", "max_falloff", LIMIT)  # options of the fit and of its export
+LIMIT = "max_bytes"  # of the export; all other options are the fit's
+OFTEN = 10  # icons after which the page is written again: it takes long
 
 
 class Drawing(NamedTuple):
@@ -58,10 +60,10 @@ class Icon(NamedTuple):
     pictures: Float32Array
 
 
-def chosen(folder: Path, count: int) -> list[Path]:
+def chosen(folder: Path, most: int) -> list[Path]:
     """So many of the SVG files below a folder, evenly spaced by name."""
     paths = sorted(folder.rglob("*.svg"))
-    steps = np.linspace(0, len(paths) - 1, min(count, len(paths))).round().astype(int)
+    steps = np.linspace(0, len(paths) - 1, min(most, len(paths))).round().astype(int)
     return [paths[step] for step in steps]
 
 
@@ -149,8 +151,6 @@ def through(path: Path, hands: list[str], shapes: int | str, options: dict[str, 
     if not picture[..., 3].any():
         return None
     found = {hand: HANDS[hand](svg, picture, shapes, options) for hand in hands}
-    for hand, (drawing, _) in found.items():
-        print(f"{path.stem}, {hand}: {drawing}", flush=True)
     drawings = {hand: drawing for hand, (drawing, _) in found.items()}
     return Icon(path.stem, drawings, np.vstack([over_white(drawn) for _, drawn in found.values()]))
 
@@ -213,52 +213,53 @@ artist's, the median of the icons' own. PSNR: premultiplied, alpha among the cha
 CIEDE2000, over white. Both of the SVG as resvg draws it. Seconds of user and system time."""
 
 
-def page(icons: list[Icon], command: str, shown: str) -> str:
+def page(icons: list[Icon], asked: Asked) -> Page:
     """The whole of it in Markdown."""
     hands = list(icons[0].drawings)
-    about = ABOUT.format(side=SIDE)
-    parts = ["# Icons made by others", f"    {command}", about, "\n".join(table(icons))]
-    parts += [compared(icons)] if {"sdf2vec", "vtracer"} <= set(hands) else []
-    parts += [f"![Some of them; from above: {', '.join(hands)}]({shown})"]
-    return "\n\n".join(parts) + "\n"
+    both = compared(icons) if {"sdf2vec", "vtracer"} <= set(hands) else ""
+    shown = asked.figure(FIGURE, f"Some of them; from above: {', '.join(hands)}")
+    parts = ABOUT.format(side=SIDE), "\n".join(table(icons)), both, shown
+    return asked.page("Icons made by others", *parts, figures={FIGURE: figure(icons)})
 
 
-def main() -> None:
-    """Entry point of `python -m sdf2vec.bench.icons`."""
-    parser = argparse.ArgumentParser(
-        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+def _shapes(text: str) -> int | str:
+    return text if text == AUTO else choices.whole_number(1)(text)
+
+
+def add_choices(parser: argparse.ArgumentParser) -> None:
+    """The flags of `sdf2vec bench icons`."""
+    parser.add_argument(
+        "folder", type=choices.folder, metavar="FOLDER", help="of SVG files, also within others"
     )
-    parser.add_argument("folder", type=Path)
-    parser.add_argument("--shapes", default="auto", help="auto, or how many")
-    parser.add_argument("--icons", type=int, default=ICONS)
-    parser.add_argument("--kind", help="of the fit")
-    parser.add_argument("--preset", help="of the fit")
-    parser.add_argument("--max-falloff", type=float, help="of the fit")
-    parser.add_argument("--max-bytes", help="of the export")
-    parser.add_argument("--hands", default=",".join(HANDS), help="whose drawings are compared")
-    parser.add_argument("-o", "--output", type=Path, required=True)
-    options = parser.parse_args()
-    hands = [hand for hand in options.hands.split(",") if hand != "vtracer" or PEERS["vtracer"].found()]
-    given = {name: value for name, value in vars(options).items() if name in GIVEN and value is not None}
-    shapes = "auto" if options.shapes == "auto" else int(options.shapes)
-    shown: Path = options.output.with_suffix(".png")
-    said = "".join(f" --{name.replace('_', '-')} {value}" for name, value in given.items())
-    command = (
-        f"python -m sdf2vec.bench.icons {options.folder.name} --shapes {shapes}{said} --icons {options.icons}"
+    parser.add_argument(
+        "--shapes",
+        type=choices.reader(_shapes),
+        default=AUTO,
+        metavar="N|auto",
+        help="how many (default: auto)",
     )
+    choices.add_count(parser, "--icons", ICONS, "how many of them")
+    choices.add_list(parser, "--hands", choices.names("hand", HANDS), ",".join(HANDS), "whose drawings")
+    choices.add_fit(parser, "kind", "preset", "max_falloff")
+    parser.add_argument(
+        "--max-bytes", type=choices.limit, metavar="BYTES", help="of the SVG, as 4000 or 4000gz"
+    )
+
+
+def pages(options: argparse.Namespace, asked: Asked) -> Iterator[Page]:
+    """A page after every few icons, and one of all. Raises Sdf2vecError where there is none."""
+    hands = [hand for hand in options.hands if hand != "vtracer" or PEERS["vtracer"].found()]
+    given = choices.fit_of(options) | {LIMIT: options.max_bytes}
     icons: list[Icon] = []
     for path in chosen(options.folder, options.icons):
-        icon = through(path, hands, shapes, given)
-        icons += [icon] if icon else []
-        if icons and len(icons) % 10 == 0:  # it takes long
-            write_atomically(options.output, page(icons, command, shown.name).encode())
+        icon = through(path, hands, options.shapes, given)
+        if icon is None:
+            continue
+        icons.append(icon)
+        for hand, drawing in icon.drawings.items():
+            asked.say(f"{icon.name}, {hand}: {drawing}")
+        if len(icons) % OFTEN == 0:
+            yield page(icons, asked)
     if not icons:
-        parser.error(f"{options.folder} has no SVG that resvg draws")
-    write_atomically(shown, figure(icons))
-    write_atomically(
-        options.output, page(icons, f"{command} -o {options.output.as_posix()}", shown.name).encode()
-    )
-
-
-if __name__ == "__main__":
-    main()
+        raise Sdf2vecError(f"{options.folder}: has no SVG that resvg draws")
+    yield page(icons, asked)

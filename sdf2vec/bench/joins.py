@@ -1,25 +1,29 @@
-"""Known pictures, drawn by resvg, each found by one layer of joined shapes. Writes a table and a figure beside it.
-
-python -m sdf2vec.bench.joins -o docs/joins.md
-"""
+"""Known pictures, drawn by resvg, each found by one layer of joined shapes."""
 
 from __future__ import annotations
 
 import argparse
 from collections import Counter
-from collections.abc import Iterator
-from pathlib import Path
+from collections.abc import Callable, Iterator
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from ..api import render
 from ..blend import JOINS
+from ..deferred import deferred
 from ..engines import resvg
-from ..files import write_atomically
 from ..image import Picture, encode_png
 from ..scene import Layer, Scene
-from .fits import Fitted, measured
+from . import choices
+from .table import Asked, Page
 
+if TYPE_CHECKING:
+    from .fits import Fitted
+
+measured: Callable[..., tuple[Fitted, Scene]] = deferred("sdf2vec.bench.fits", "measured")
+
+FIGURE = ".png"
 SEEDS = 20
 SIDE = 160  # pixels
 CUTS = 12
@@ -81,50 +85,31 @@ def side_by_side(pictures: dict[str, Picture], found: dict[str, list[tuple[Fitte
     return encode_png(np.hstack(columns).astype(np.float32))
 
 
-def page(found: dict[str, list[tuple[Fitted, Scene]]], output: Path, shown: Path) -> str:
-    """What was found of each picture, as a table, and the name of the figure."""
-    seeds = min(map(len, found.values()))
-    return (
-        "\n\n".join(
-            (
-                "# Known pictures as one layer of joined shapes",
-                f"    python -m sdf2vec.bench.joins --seeds {seeds} -o {output.as_posix()}",
-                f"Drawn by resvg at {SIDE} × {SIDE} pixels, white on black; fitted from one shape by "
-                f'`fit(picture, 1, kind="mixed", preset="fast", cuts={CUTS})`, {seeds} seeds each. `-` is subtraction, '
-                "`&` intersection, `|` union. PSNR is the median over the seeds; resvg's edges are box-filtered, ours "
-                "logistic: the exact ring has about 43 dB. Seconds are the median of user and system time.",
-                "\n".join(table(found)),
-                f"![The pictures above, the renders of seed 0 below]({shown.name})",
-            )
+ABOUT = f"""Drawn by resvg at {SIDE} × {SIDE} pixels, white on black; fitted from one shape by `fit(picture, 1, \
+kind="mixed", preset="fast", cuts={CUTS})`, {{seeds}} seeds each. `-` is subtraction, `&` intersection, `|` union. \
+PSNR is the median over the seeds; resvg's edges are box-filtered, ours logistic: the exact ring has about 43 dB. \
+Seconds are the median of user and system time."""
+
+
+def add_choices(parser: argparse.ArgumentParser) -> None:
+    """The flags of `sdf2vec bench joins`."""
+    choices.add_count(parser, "--seeds", SEEDS, "how many seeds")
+
+
+def pages(options: argparse.Namespace, asked: Asked) -> Iterator[Page]:
+    """A page after every seed: it takes long."""
+    drawn = {name: picture(body, SIDE) for name, body in DRAWN.items()}
+    found: dict[str, list[tuple[Fitted, Scene]]] = {name: [] for name in drawn}
+    for seed in range(options.seeds):
+        for name, one in drawn.items():
+            fitted, scene = measured(one, 1, kind="mixed", preset="fast", cuts=CUTS, seed=seed)
+            found[name].append((fitted, scene))
+            told = f"{fitted.psnr:.1f} dB, {fitted.cpu:.0f} s, {structure(scene.layers[0])}"
+            asked.say(f"{name}, seed {seed}: {told}")
+        yield asked.page(
+            "Known pictures as one layer of joined shapes",
+            ABOUT.format(seeds=seed + 1),
+            "\n".join(table(found)),
+            asked.figure(FIGURE, "The pictures above, the renders of seed 0 below"),
+            figures={FIGURE: side_by_side(drawn, found)},
         )
-        + "\n"
-    )
-
-
-def _fit(name: str, drawn: Picture, seed: int) -> tuple[Fitted, Scene]:
-    fitted, scene = measured(drawn, 1, kind="mixed", preset="fast", cuts=CUTS, seed=seed)
-    print(
-        f"{name}, seed {seed}: {fitted.psnr:.1f} dB, {fitted.cpu:.0f} s, {structure(scene.layers[0])}",
-        flush=True,
-    )
-    return fitted, scene
-
-
-def main() -> None:
-    """Entry point of `python -m sdf2vec.bench.joins`."""
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--seeds", type=int, default=SEEDS)
-    parser.add_argument("-o", "--output", type=Path, required=True)
-    options = parser.parse_args()
-    pictures = {name: picture(body, SIDE) for name, body in DRAWN.items()}
-    found: dict[str, list[tuple[Fitted, Scene]]] = {name: [] for name in pictures}
-    shown = options.output.with_suffix(".png")
-    for seed in range(options.seeds):  # written after each: it takes long
-        for name, drawn in pictures.items():
-            found[name].append(_fit(name, drawn, seed))
-        write_atomically(shown, side_by_side(pictures, found))
-        write_atomically(options.output, page(found, options.output, shown).encode())
-
-
-if __name__ == "__main__":
-    main()

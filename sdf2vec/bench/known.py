@@ -1,6 +1,4 @@
-"""Known scenes found again: how many shapes, of which kinds, how near. Writes a table and a figure for each tool.
-
-    python -m sdf2vec.bench.known --shapes auto --tool sdf2vec --tool vtracer -o docs/known.md
+"""Known scenes found again: how many shapes, of which kinds, how near.
 
 For another tool: `--pictures FOLDER` writes the pictures, `--svg FOLDER` judges the SVG of the same names.
 """
@@ -20,11 +18,14 @@ from .. import api
 from ..arrays import Float32Array
 from ..errors import Sdf2vecError
 from ..files import write_atomically
+from ..fit.settings import AUTO
 from ..image import Picture, encode_png
+from . import choices
 from .known_drawing import KnownScene
 from .known_scenes import COUNTS, MODES, SIDE, known_scene
 from .peers import drawn_by
 from .recovery import ENOUGH, Answer, Verdict, f1, judged, scene_answer, svg_answer
+from .table import Asked, Page
 
 SEEDS = 20
 KINDS = "circle,ellipse,box,triangle"
@@ -72,9 +73,9 @@ def fitted(known: KnownScene, shapes: int | str, **options: Any) -> Answer:
 
 def by_fit(case: Case, known: KnownScene, options: argparse.Namespace) -> Answer:
     """This program, told how many shapes there are or nothing."""
-    chosen = {name: getattr(options, name) for name in ("kind", "preset", "cuts") if getattr(options, name)}
-    if options.shapes == "auto":
-        return fitted(known, "auto", seed=case.seed, **chosen)
+    chosen = choices.fit_of(options)
+    if options.shapes == AUTO:
+        return fitted(known, AUTO, seed=case.seed, **chosen)
     return fitted(known, max(case.true, 1), seed=case.seed, **({"kind": KINDS} | chosen))
 
 
@@ -112,11 +113,6 @@ def result(tool: str, case: Case, known: KnownScene, options: argparse.Namespace
     """One scene through one tool."""
     answer = TOOLS[tool](case, known, options)
     verdict = judged(known, answer)
-    print(
-        f"{tool}, {case.name}: {verdict.found} of {verdict.true} shapes, {verdict.matched} right, "
-        f"{verdict.outlines} outlines, {verdict.psnr:.1f} dB, {verdict.seconds:.1f} s",
-        flush=True,
-    )
     return Result(case, verdict, np.vstack([known.pixels, _gutter(known.side, across=True), answer.pixels]))
 
 
@@ -195,13 +191,15 @@ def _gutter(length: int, across: bool) -> Float32Array:
     return np.ones((GUTTER, length, 3) if across else (length, GUTTER, 3), np.float32)
 
 
-def page(found: dict[str, list[Result]], command: str, figures: dict[str, str]) -> str:
+def page(found: dict[str, list[Result]], asked: Asked) -> Page:
     """The whole of it in Markdown."""
-    parts = ["# Known scenes found again", f"    {command}", ABOUT.format(side=SIDE)]
+    parts, figures = [ABOUT.format(side=SIDE)], {}
     for tool, results in found.items():
-        parts += [f"## {tool}", "\n".join(table(results))]
-        parts.append(f"![The first of each: the true picture above, what was found below]({figures[tool]})")
-    return "\n\n".join(parts) + "\n"
+        suffix = f".{tool}.png"
+        figures[suffix] = figure(results)
+        shown = asked.figure(suffix, "The first of each: the true picture above, what was found below")
+        parts += [f"## {tool}", "\n".join(table(results)), shown]
+    return asked.page("Known scenes found again", *parts, figures=figures)
 
 
 ABOUT = """Pictures of {side} × {side} pixels, made by code from so many circles, ellipses, boxes and triangles, \
@@ -222,74 +220,53 @@ is the true shapes as this program draws them: what PSNR the antialiasing leaves
 # --- the command --------------------------------------------------------------------------------------------
 
 
-def arguments() -> argparse.Namespace:
-    """What the command is asked for."""
-    parser = argparse.ArgumentParser(
-        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+def add_choices(parser: argparse.ArgumentParser) -> None:
+    """The flags of `sdf2vec bench known`."""
+    parser.add_argument(
+        "--shapes", choices=(AUTO, "true"), default=AUTO, help="what a fit is told (default: auto)"
     )
-    parser.add_argument("--shapes", choices=("auto", "true"), default="auto", help="what a fit is told")
-    parser.add_argument("--tool", action="append", choices=tuple(TOOLS), help="several may be given")
-    parser.add_argument("--svg", type=Path, metavar="FOLDER", help="judge these files, as the tool `files`")
+    known = ", ".join(TOOLS)
+    parser.add_argument(
+        "--tools",
+        type=choices.names("tool", TOOLS),
+        metavar="LIST",
+        help=f"what finds them: {known} (default: sdf2vec, or files with --svg)",
+    )
+    parser.add_argument(
+        "--svg", type=choices.folder, metavar="FOLDER", help="judge these files, as the tool `files`"
+    )
     parser.add_argument(
         "--pictures", type=Path, metavar="FOLDER", help="write the pictures there, fit nothing"
     )
-    parser.add_argument("--seeds", type=int, default=SEEDS)
-    parser.add_argument("--counts", default=",".join(map(str, COUNTS)), help="how many shapes there are")
-    parser.add_argument("--modes", default=",".join(MODES))
-    parser.add_argument("--kind", help="of a fit")
-    parser.add_argument("--preset", help="of a fit")
-    parser.add_argument("--cuts", type=int, default=0, help="of a fit")
-    parser.add_argument("-o", "--output", type=Path)
-    options = parser.parse_args()
-    options.tool = options.tool or (["files"] if options.svg else ["sdf2vec"])
-    if "files" in options.tool and not options.svg:
-        parser.error("the tool `files` needs --svg FOLDER")
-    return options
+    choices.add_count(parser, "--seeds", SEEDS, "how many seeds")
+    numbers = choices.reader(choices.several(choices.whole_number(0)))
+    choices.add_list(parser, "--counts", numbers, ",".join(map(str, COUNTS)), "how many shapes there are")
+    choices.add_list(parser, "--modes", choices.names("mode", MODES), ",".join(MODES), "how shapes lie")
+    choices.add_fit(parser, "kind", "preset", "cuts")
 
 
-def _command(options: argparse.Namespace) -> str:
-    """How to do it again."""
-    words = [f"--shapes {options.shapes}"] + [f"--tool {tool}" for tool in options.tool]
-    plain = {name: getattr(options, name) for name in ("kind", "preset", "cuts")}
-    words += [f"--{name} {value}" for name, value in plain.items() if value]
-    usual = {"counts": ",".join(map(str, COUNTS)), "modes": ",".join(MODES)}
-    words += [
-        f"--{name} {vars(options)[name]}" for name, value in usual.items() if vars(options)[name] != value
-    ]
-    return f"python -m sdf2vec.bench.known {' '.join(words)} --seeds {options.seeds} -o {options.output.as_posix()}"
-
-
-def main() -> None:
-    """Entry point of `python -m sdf2vec.bench.known`."""
-    options = arguments()
-    counts = [int(count) for count in options.counts.split(",")]
-    found: dict[str, list[Result]] = {tool: [] for tool in options.tool}
-    for seed in range(options.seeds):  # written after each: it takes long
-        cases = [Case(mode, count, seed) for mode, count in product(options.modes.split(","), counts)]
+def pages(options: argparse.Namespace, asked: Asked) -> Iterator[Page]:
+    """A page after every seed: it takes long. None where only the pictures are wanted. Raises Sdf2vecError."""
+    tools = _tools_of(options)
+    found: dict[str, list[Result]] = {tool: [] for tool in tools}
+    for seed in range(options.seeds):
+        cases = [Case(mode, true, seed) for mode, true in product(options.modes, options.counts)]
         if options.pictures:
             for case in cases:
                 write_atomically(options.pictures / f"{case.name}.png", encode_png(case.known.pixels))
             continue
         for case in cases:
             known = case.known
-            for tool in options.tool:
+            for tool in tools:
                 found[tool].append(result(tool, case, known, options))
-        if options.output:
-            _write(found, options)
-    if not options.pictures and not options.output:
-        for tool, results in found.items():
-            print(f"{tool}\n", *table(results), sep="\n")
+                asked.say(f"{tool}, {case.name}: {found[tool][-1].verdict.told}")
+        yield page(found, asked)
 
 
-def _write(found: dict[str, list[Result]], options: argparse.Namespace) -> None:
-    """The page, and the figures beside it."""
-    page_path: Path = options.output
-    figures = {tool: page_path.with_suffix(f".{tool}.png") for tool in found}
-    for tool, path in figures.items():
-        write_atomically(path, figure(found[tool]))
-    names = {tool: path.name for tool, path in figures.items()}
-    write_atomically(page_path, page(found, _command(options), names).encode())
-
-
-if __name__ == "__main__":
-    main()
+def _tools_of(options: argparse.Namespace) -> list[str]:
+    """Those of `--tools`, or files where there are some. Raises Sdf2vecError where there are none for `files`."""
+    choices.fit_of(options)
+    tools: list[str] = options.tools or ["files" if options.svg else "sdf2vec"]
+    if "files" in tools and not options.svg:
+        raise Sdf2vecError("the tool `files` needs --svg FOLDER")
+    return tools

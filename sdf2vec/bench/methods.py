@@ -119,14 +119,6 @@ def _option_of(word: str) -> dict[str, Any]:
     return WORDS[word]
 
 
-def counts_of(text: str) -> list[int]:
-    """Numbers of shapes from a list such as 64,256. Raises Sdf2vecError for anything else."""
-    parts = [part.strip() for part in text.split(",")]
-    if not all(part.isdigit() and 0 < int(part) <= 65536 for part in parts):
-        raise Sdf2vecError(f"numbers of shapes are a list as 64,256, got {text!r}")
-    return list(dict.fromkeys(map(int, parts)))
-
-
 def described(methods: Sequence[Method]) -> list[str]:
     """A line for each: what exactly is done."""
     lines = []

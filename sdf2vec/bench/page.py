@@ -108,11 +108,9 @@ def markdown(results: Results, about: Sequence[str]) -> str:
     parts = [
         "# Speed against accuracy",
         "\n".join(f"    {command}" for command in results.commands),
-        f"{results.machine.processor}, {results.machine.cores} cores; "
-        + ", ".join(f"{name} {found}" for name, found in results.machine.versions.items())
-        + ". Seconds, CPU seconds and memory are those of the whole process, from its start to its SVG; kernels "
-        "were compiled before. Scored by the same code at the picture's own size: the render, or another program's "
-        "SVG drawn by resvg. `dB of it`: the SVG before it, as resvg draws it.",
+        f"{results.machine.told}. Seconds, CPU seconds and memory are those of the whole process, from its start to "
+        "its SVG; kernels were compiled before. Scored by the same code at the picture's own size: the render, or "
+        "another program's SVG drawn by resvg. `dB of it`: the SVG before it, as resvg draws it.",
     ]
     if results.absent:
         parts.append(f"Not on this machine: {', '.join(results.absent)}.")

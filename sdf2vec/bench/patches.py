@@ -1,7 +1,4 @@
-"""A portrait in waves: additive Gabor patches, drawn most exactly in the face, beside triangles. Writes a table in
-Markdown and a figure beside it.
-
-    python -m sdf2vec.bench.patches -o docs/patches.md
+"""A portrait in waves: additive Gabor patches, drawn most exactly in the face, beside triangles.
 
 The picture is scikit-image's astronaut unless another is given, with where its face is.
 """
@@ -9,22 +6,31 @@ The picture is scikit-image's astronaut unless another is given, with where its 
 from __future__ import annotations
 
 import argparse
+from collections.abc import Callable, Iterator
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 import skimage
 
 from ..api import render
 from ..arrays import Float32Array
-from ..files import write_atomically
+from ..deferred import deferred
+from ..errors import Sdf2vecError
 from ..image import Picture, encode_png, load, resize
 from ..scene import Scene
-from .fits import Fitted, measured
+from . import choices
+from .table import Asked, Page
+
+if TYPE_CHECKING:
+    from .fits import Fitted
+
+measured: Callable[..., tuple[Fitted, Scene]] = deferred("sdf2vec.bench.fits", "measured")
 
 FACE = (0.435, 0.225, 0.13)  # of the astronaut: centre and radius, in shares of the width and the height
 ELSEWHERE = 0.3  # how much an error matters far from the face
 SHOWN = 256  # pixels across, of each picture in the figure
+FIGURE = ".png"
 ASTRONAUT = Path(skimage.__file__).parent / "data" / "astronaut.png"
 
 
@@ -67,59 +73,52 @@ def row(way: Way, fitted: Fitted, in_face: float, scene: Scene) -> str:
     )
 
 
-def page(picture: Picture, face: tuple[float, float, float], preset: str, command: str, shown: Path) -> str:
-    """The table; the figure is written on the way."""
-    weights = weight_map(picture.height, picture.width, face)
+HEAD = (
+    "| what | numbers | dB in the face | dB | SSIM | FLIP | CPU seconds |",
+    "|---|---:|---:|---:|---:|---:|---:|",
+)
+ABOUT = f"""Fitted with seed 0 under a weight map that counts the face fully and what is far from it {ELSEWHERE:g}. \
+A Gabor patch is a Gaussian envelope times a cosine, its colour signed. Scored at the picture's full size."""
+
+
+def figure(picture: Picture, renders: list[Float32Array]) -> bytes:
+    """A PNG: the picture and the renders, side by side."""
+    width, height = SHOWN, round(SHOWN * picture.height / picture.width)
+    images = (picture.premultiplied[..., :3], *renders)
+    small = [resize(np.ascontiguousarray(image), width, height) for image in images]
+    return encode_png(np.hstack(small))
+
+
+def _face(text: str) -> tuple[float, float, float]:
+    try:
+        x, y, radius = map(float, text.split(","))
+    except ValueError:
+        x = y = radius = 0.0
+    if not (0 <= x <= 1 and 0 <= y <= 1 and 0 < radius <= 1):
+        raise Sdf2vecError(f"a face is x,y,radius in shares of the sides, got {text!r}")
+    return x, y, radius
+
+
+def add_choices(parser: argparse.ArgumentParser) -> None:
+    """The flags of `sdf2vec bench patches`."""
+    parser.add_argument("picture", nargs="?", type=choices.picture, metavar="PICTURE")
+    where = ",".join(map(str, FACE))
+    choices.add_list(parser, "--face", choices.reader(_face), where, "x,y,radius in shares of the sides")
+    choices.add_fit(parser, "preset")
+
+
+def pages(options: argparse.Namespace, asked: Asked) -> Iterator[Page]:
+    """A page after every way to say the picture."""
+    fit, picture = choices.fit_of(options), load(options.picture or ASTRONAUT)
+    weights = weight_map(picture.height, picture.width, options.face)
     source = Picture(np.repeat(weights[..., None], 3, axis=2))
-    rows, renders = [], [picture.premultiplied[..., :3]]
+    rows: list[str] = []
+    renders: list[Float32Array] = []
     for way in WAYS:
-        fitted, scene = measured(picture, way.shapes, preset=preset, weights=source, seed=0, **way.options)
+        fitted, scene = measured(picture, way.shapes, weights=source, seed=0, **fit, **way.options)
         renders.append(render(scene))
         rows.append(row(way, fitted, psnr_in_face(renders[-1], picture, weights), scene))
-        print(rows[-1], flush=True)
-    small = [resize(np.ascontiguousarray(image), *_shown_size(picture)) for image in renders]
-    write_atomically(shown, encode_png(np.hstack(small)))
-    return "\n".join(
-        (
-            "# A portrait in waves",
-            "",
-            f"    {command}",
-            "",
-            f"Fitted with preset `{preset}`, seed 0, under a weight map that counts the face fully and what is "
-            f"far from it {ELSEWHERE:g}. A Gabor patch is a Gaussian envelope times a cosine, its colour signed. "
-            "Scored at the picture's full size.",
-            "",
-            "| what | numbers | dB in the face | dB | SSIM | FLIP | CPU seconds |",
-            "|---|---:|---:|---:|---:|---:|---:|",
-            *rows,
-            "",
-            f"![The picture, then the rows in order]({shown.name})",
-            "",
-        )
-    )
-
-
-def _shown_size(picture: Picture) -> tuple[int, int]:
-    return SHOWN, round(SHOWN * picture.height / picture.width)
-
-
-def main() -> None:
-    """Entry point of `python -m sdf2vec.bench.patches`."""
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("picture", nargs="?", type=Path)
-    parser.add_argument("--face", default=",".join(map(str, FACE)), help="x,y,radius in shares of the sides")
-    parser.add_argument("--preset", default="balanced")
-    parser.add_argument("-o", "--output", type=Path, required=True)
-    options = parser.parse_args()
-    x, y, radius = (float(part) for part in options.face.split(","))
-    named = "" if options.picture is None else f"{options.picture} --face {options.face} "
-    command = (
-        f"python -m sdf2vec.bench.patches {named}--preset {options.preset} -o {options.output.as_posix()}"
-    )
-    picture = load(options.picture or ASTRONAUT)
-    shown = options.output.with_suffix(".png")
-    write_atomically(options.output, page(picture, (x, y, radius), options.preset, command, shown).encode())
-
-
-if __name__ == "__main__":
-    main()
+        asked.say(rows[-1])
+        shown = asked.figure(FIGURE, "The picture, then the rows in order")
+        table, figures = "\n".join((*HEAD, *rows)), {FIGURE: figure(picture, renders)}
+        yield asked.page("A portrait in waves", ABOUT, table, shown, figures=figures)

@@ -62,6 +62,14 @@ class Verdict(NamedTuple):
         """Found shapes for each true one; of a flat picture one more than were found."""
         return self.found / self.true if self.true else 1.0 + self.found
 
+    @property
+    def told(self) -> str:
+        """In a line."""
+        return (
+            f"{self.found} of {self.true} shapes, {self.matched} right, {self.outlines} outlines, {self.psnr:.1f} dB, "
+            f"{self.seconds:.1f} s"
+        )
+
 
 def f1(verdicts: Sequence[Verdict], of_kind: bool = True) -> float:
     """F1 of all shapes of some scenes together; 1 where there are none and none was found."""

@@ -32,6 +32,12 @@ class Machine(Struct, frozen=True):
     cores: int
     versions: dict[str, str]
 
+    @property
+    def told(self) -> str:
+        """In a line."""
+        versions = ", ".join(f"{name} {found}" for name, found in self.versions.items())
+        return f"{self.processor}, {self.cores} cores; {versions}"
+
 
 class Run(Struct, frozen=True, omit_defaults=True):
     """One picture through one method, scored at the picture's own size.

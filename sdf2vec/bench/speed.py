@@ -1,183 +1,27 @@
-"""How fast the fused renderer is. Writes tables in Markdown.
-
-    python -m sdf2vec.bench.speed -o docs/speed.md
-
-Ratios are measured side by side in one run. The picture is made by code.
-"""
+"""How fast the fused renderer is, as a page: what `timing.py` measures."""
 
 from __future__ import annotations
 
 import argparse
-import os
-import resource
-import time
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass
-from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
-import numpy as np
-import torch
+from ..deferred import deferred
+from ..extras import needed
+from .table import Asked, Page
 
-from ..blend import OVER
-from ..expr import Expr
-from ..files import write_atomically
-from ..fit.adam import adam_over
-from ..fit.initialization import Layers, place
-from ..fit.losses import l1
-from ..fit.presets import Start
-from ..fit.settings import MIXED, kinds_of
-from ..fit.ssim import Dissimilarity
-from ..layer import Formula, Part
-from ..lower.block import dependent, derivatives
-from ..metrics import ssim
-from ..render import fused, kernels, reference
-from ..render.tensors import SceneTensors
-from ..shapes import KINDS
-from ..threads import available_cores, threads_of_its_own
-from .chains import chains
-from .chart import Chart, write
+if TYPE_CHECKING:
+    from .chart import Chart
+    from .timing import Grown
 
+against_dense: Callable[[], Iterator[str]] = deferred("sdf2vec.bench.timing", "against_dense")
+per_shape_pixel: Callable[[], Iterator[str]] = deferred("sdf2vec.bench.timing", "per_shape_pixel")
+growth: Callable[[], Iterator[Grown]] = deferred("sdf2vec.bench.timing", "growth")
+make_chart: Callable[..., Chart] = deferred("sdf2vec.bench.chart", "Chart")
+drawn: Callable[[Chart], Any] = deferred("sdf2vec.bench.chart", "drawn")
+encoded: Callable[[Any, str], bytes] = deferred("sdf2vec.bench.chart", "encoded")
 
-def picture(side: int) -> torch.Tensor:
-    """Soft stripes and discs, [3, side, side]."""
-    y, x = torch.meshgrid(*(torch.linspace(-0.5, 0.5, side),) * 2, indexing="ij")
-    waves = [0.5 + 0.5 * torch.sin(a * x + b * y + 9 * x * y) for a, b in ((20, 7), (-9, 23), (13, -17))]
-    discs = torch.sigmoid((0.3 - torch.hypot(x - 0.1, y)) * 60)
-    return torch.stack([wave * (0.6 + 0.4 * discs) for wave in waves])
-
-
-def scene(kinds: Sequence[str], count: int, target: torch.Tensor, compositing: str = "over") -> SceneTensors:
-    """What a fit starts with."""
-    layers = Layers(tuple(kinds), compositing)
-    return place(target, (1.0, 1.0), layers, count, Start(), torch.Generator().manual_seed(0))
-
-
-def seconds(run: Callable[[], object], least: float = 1.0) -> float:
-    """Median time of a call, after one to warm up."""
-    run()
-    times: list[float] = []
-    while sum(times) < least or len(times) < 3:
-        started = time.perf_counter()
-        run()
-        times.append(time.perf_counter() - started)
-    return float(np.median(times))
-
-
-def step(tensors: SceneTensors, target: torch.Tensor, dense: bool) -> Callable[[], object]:
-    """One step of a fit: forward, loss (L1 and SSIM), backward, update."""
-    optimizer = adam_over(tensors)
-    height, width = target.shape[1:]
-    fast, absolute = Dissimilarity(target), l1(target)
-
-    def run() -> None:
-        optimizer.zero_grad()
-        if dense:
-            image = reference.composite(tensors, width, height)[:3]
-            loss = 0.8 * absolute(image) + 0.2 * (1 - ssim(image, target))
-        else:
-            image = fused.composite(tensors, width, height, 3)
-            loss = 0.8 * absolute(image) + 0.2 * fast(image)
-        loss.backward()
-        optimizer.step(0.0)  # the same scene again and again
-
-    return run
-
-
-def against_dense() -> Iterator[str]:
-    """A step of a fit, fused and dense, in one run."""
-    yield "| kind | dense ms | fused ms | times faster |"
-    yield "|---|---:|---:|---:|"
-    target = picture(256)
-    for kind in (*KINDS, MIXED):
-        kinds = kinds_of(kind)
-        slow = seconds(step(scene(kinds, 256, target), target, dense=True), least=0.1)
-        with threads_of_its_own():
-            fast = seconds(step(scene(kinds, 256, target), target, dense=False))
-        yield f"| {kind} | {slow * 1e3:.0f} | {fast * 1e3:.1f} | {slow / fast:.0f} |"
-
-
-def per_shape_pixel() -> Iterator[str]:
-    """Forward and backward on one thread, all overhead included."""
-    peak = multiply_add_peak()
-    yield f"Measured peak of this core: {peak:.0f} billion float32 operations a second (a multiply-add is two)."
-    yield ""
-    yield "| kind | step ms | ns per pixel in the extents | ns per covered pixel | share of the peak |"
-    yield "|---|---:|---:|---:|---:|"
-    target = picture(256)
-    os.environ["SDF2VEC_THREADS"] = "1"
-    for kind in KINDS:
-        tensors = scene((kind,), 256, target)
-        weights = torch.randn(3, 256, 256, generator=torch.Generator().manual_seed(0))
-        for group in tensors.groups:
-            for tensor in group.values.values():
-                tensor.requires_grad_()
-
-        def run(tensors: SceneTensors = tensors, weights: torch.Tensor = weights) -> None:
-            fused.composite(tensors, 256, 256, 3).backward(weights)
-
-        with threads_of_its_own():
-            spent = seconds(run)
-        inside, covered = pixels_in_extents(tensors, 256), covered_pixels(tensors, 256)
-        share = operations(kind) * inside / spent / 1e9 / peak
-        per = f"{spent / inside * 1e9:.1f} | {spent / covered * 1e9:.1f}"
-        yield f"| {kind} | {spent * 1e3:.2f} | {per} | {share:.0%} |"
-    del os.environ["SDF2VEC_THREADS"]
-
-
-def covered_pixels(tensors: SceneTensors, side: int) -> int:
-    """Pairs of a layer and a pixel with a coverage above 0."""
-    cover, _ = reference.layers_at(tensors, *reference.canvas(tensors, side, side))
-    return int((cover != 0).sum())
-
-
-def pixels_in_extents(tensors: SceneTensors, side: int) -> float:
-    """Pairs of a layer and a pixel of the canvas in the layer's bounding box; squares have sides of 1."""
-    low, high = (edge.clamp(-0.5, 0.5) * side for edge in fused.extents_of(tensors, side, side))
-    return float((high - low).clamp(min=0).prod(dim=1).sum())
-
-
-def operations(kind: str) -> int:
-    """Float operations per pixel of a step: the layer drawn twice, and its derivatives."""
-    block = kernels.drawn(Formula.of((Part(kind),)), "layer", OVER, 3)
-    found = derivatives(block, kernels.carried(3))
-    inner = dependent((*found.sums, *found.carried), (*block.varying, *found.cotangents))
-    drawn = sum(map(_weight, dependent(block.outputs, block.varying)))
-    return 2 * drawn + sum(map(_weight, inner)) + len(found.sums)
-
-
-def _weight(node: Expr) -> int:
-    """How many operations the kernels spend on a node; a division or a square root counts as one."""
-    return {"var": 0, "sigmoid": 27, "sin": 20, "exp": 22, "mix": 3, "clamp": 2}.get(node.op, 1)
-
-
-def multiply_add_peak() -> float:
-    """Billions of float32 operations per second of one core."""
-    x, rounds = np.full(1024, 0.25, np.float32), 1000
-    return 2 * 8 * 16 * x.size * rounds / seconds(lambda: chains(x, rounds)) / 1e9
-
-
-@dataclass(frozen=True)
-class Grown:
-    """One step of a fit at some size, in milliseconds; layers listed for a tile; peak memory of the process."""
-
-    shapes: int
-    side: int
-    milliseconds: float
-    depth: float
-    megabytes: float
-
-
-def growth() -> Iterator[Grown]:
-    """A step by number of shapes and picture size, triangles."""
-    for count in (64, 256, 1024, 4096, 8192):
-        for side in (128, 256, 512, 1024):
-            target = picture(side)
-            tensors = scene(("triangle",), count, target)
-            with threads_of_its_own():
-                spent = seconds(step(tensors, target, dense=False), least=0.3)
-                bins = fused.bins_of(tensors, side, side)
-            peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024
-            yield Grown(count, side, spent * 1e3, len(bins.layers) / (len(bins.starts) - 1), peak)
+CHART = ".growth.svg"
 
 
 def growth_table(grown: Sequence[Grown]) -> Iterator[str]:
@@ -197,38 +41,32 @@ def growth_chart(grown: Sequence[Grown]) -> Chart:
     first = min((g for g in grown if g.side == 256), key=lambda g: g.shapes)
     dense = [(g.shapes, first.milliseconds * g.shapes / first.shapes) for g in grown if g.side == first.side]
     name = "in proportion to shapes, 256 px"
-    return Chart("One step of a fit", "shapes", "milliseconds", lines | {name: dense}, dashed=(name,))
+    return make_chart("One step of a fit", "shapes", "milliseconds", lines | {name: dense}, dashed=(name,))
 
 
-def page(grown: Sequence[Grown], chart: str) -> str:
-    """All tables."""
-    sections = (
-        "# Speed of the fused renderer",
-        f"    python -m sdf2vec.bench.speed -o docs/speed.md\n\nOn {available_cores()} CPU cores.",
+def add_choices(parser: argparse.ArgumentParser) -> None:
+    """`sdf2vec bench speed` has no flags of its own."""
+
+
+def pages(options: argparse.Namespace, asked: Asked) -> Iterator[Page]:
+    """One page. Growth is measured before dense torch takes memory."""
+    needed("matplotlib", "bench", "sdf2vec bench speed")
+    grown = []
+    for step in growth():
+        grown.append(step)
+        asked.say(f"{step.shapes} shapes at {step.side} px: {step.milliseconds:.1f} ms")
+    yield asked.page(
+        "Speed of the fused renderer",
         "## One step of a fit against the same step in dense torch\n\n256 shapes at 256 × 256, `over`: forward, "
         "L1 and SSIM, backward, Adam.",
-        "\n".join(against_dense()),
+        asked.told(against_dense()),
         "## Time per shape-pixel\n\nForward and backward of 256 shapes at 256 px on one core, all overhead included. "
         "Extents are the boxes outside of which a shape covers nothing; of a triangle's box it covers about "
         "two thirds. The share of the peak counts what the pixels in the extents need.",
-        "\n".join(per_shape_pixel()),
+        asked.told(per_shape_pixel()),
         "## Growth\n\nOne step with triangles, as a fit starts with them; layers a pixel is the mean number of "
-        f"layers listed for a tile. Memory is that of the whole process, torch included.\n\n![Growth]({chart})",
+        "layers listed for a tile. Memory is that of the whole process, torch included.",
+        asked.figure(CHART, "Growth"),
         "\n".join(growth_table(grown)),
+        figures={CHART: encoded(drawn(growth_chart(grown)), "svg")},
     )
-    return "\n\n".join(sections) + "\n"
-
-
-def main() -> None:
-    """Entry point of `python -m sdf2vec.bench.speed`. Growth is measured before dense torch takes memory."""
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("-o", "--output", type=Path, required=True)
-    output = parser.parse_args().output
-    picture_of_growth = output.with_suffix(".growth.svg")
-    grown = list(growth())
-    write(growth_chart(grown), picture_of_growth)
-    write_atomically(output, page(grown, picture_of_growth.name).encode())
-
-
-if __name__ == "__main__":
-    main()

@@ -107,7 +107,6 @@ def page(cases: Sequence[Case], found: Catalogue) -> str:
     named = [f"{case.name} ({case.left or 'not understood yet'})" for case in failing]
     said = f"Ours fails at: {'; '.join(named)}." if failing else "Ours fails at none."
     seeds = max(len(tried.failed) for tried in found.ours.values())
-    versions = ", ".join(f"{name} {version}" for name, version in found.machine.versions.items())
     return (
         "\n\n".join(
             (
@@ -115,7 +114,7 @@ def page(cases: Sequence[Case], found: Catalogue) -> str:
                 f"    sdf2vec bench --stability --seeds {seeds} -o DIR",
                 "Each entry is a small picture, scene or set of numbers made from a seed; `theirs` is a textbook's way "
                 "(`sdf2vec/bench/textbook.py`), `ours` this program. FLIP: the median over the seeds, and from the "
-                f"least to the greatest. {versions}.",
+                f"least to the greatest. {found.machine.told}.",
                 said,
                 "\n".join(_rows(cases, found)),
                 f"![How often each fails, and how far FLIP spreads]({CHART})",

@@ -1,6 +1,4 @@
-"""How near the SVG of a fit comes to its render in every renderer, and what it weighs. Writes tables in Markdown.
-
-    python -m sdf2vec.bench.svg PICTURE... --shapes 64,256 --kinds triangle,box -o docs/svg.tables.md
+"""How near the SVG of a fit comes to its render in every renderer, and what it weighs.
 
 Two pictures with alpha, made by code, are added to those named.
 """
@@ -10,25 +8,33 @@ from __future__ import annotations
 import argparse
 import math
 import time
-from collections.abc import Iterator
-from pathlib import Path
-from typing import NamedTuple
+from collections.abc import Callable, Iterator
+from itertools import product
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from .. import api
 from ..arrays import Float64Array
+from ..deferred import deferred
 from ..engines import ENGINES
 from ..export.byte_limit import gzipped_size
 from ..export.options import Options
 from ..export.svg import small_svg
 from ..exports import Exports
-from ..files import write_atomically
+from ..fit.settings import MIXED
 from ..grain import GRAINS
 from ..image import Picture, load, premultiply
-from ..render.draw import draw
 from ..scene import Scene
+from ..shapes import KINDS
+from . import choices
+from .table import Asked, Page
+
+if TYPE_CHECKING:
+    import torch
+
+draw: Callable[[Scene, int, int], torch.Tensor] = deferred("sdf2vec.render.draw", "draw")
 
 Pixels = Float64Array  # [H, W, 4] premultiplied RGBA, 0..1
 
@@ -142,44 +148,15 @@ def _draw(renderer: str, text: str, width: int, height: int) -> Pixels:
     return premultiply(ENGINES[renderer].render(text, width, height)).astype(np.float64)
 
 
-def measured(options: argparse.Namespace) -> Iterator[Row]:
+def measured(options: argparse.Namespace, fit: dict[str, Any]) -> Iterator[Row]:
     """Fits and draws everything that was asked for."""
     pictures = {path.stem: load(path) for path in options.pictures}
     pictures |= {name: load(pixels) for name, pixels in alpha_pictures().items()}
     ENGINES["chromium"].missing()  # starts it, so that no drawing pays for that
     for name, picture in pictures.items():
-        for kind in options.kinds.split(","):
-            for shapes in map(int, options.shapes.split(",")):
-                fitting = {"preset": options.preset, "seed": options.seed, "max_falloff": options.max_falloff}
-                scene = api.fit(picture, shapes, kind=kind, **fitting)
-                for row in rows(name, scene, picture, kind, options.profiles.split(",")):
-                    print(row.text(), flush=True)
-                    yield row
-
-
-def page(found: list[Row], command: str) -> str:
-    """The worst of each renderer over all drawings, sizes, then everything."""
-    lines = [
-        "# SVG against the render: measured",
-        "",
-        f"    {command}",
-        "",
-        "dB: PSNR against the torch render at the fitted size, and at twice that. Mean error: signed, in 8-bit levels. "
-        "dB to the picture: PSNR against the original; gained: by how much more than the render's. "
-        "Seconds: wall time at the fitted size on a machine with two busy cores, the start of rsvg-convert and "
-        "Firefox included. Chromium draws on the CPU.",
-        "",
-        *(line for shapes in sorted({row.shapes for row in found}) for line in _worst(found, shapes)),
-        "## Bytes",
-        "",
-        *_sizes(found),
-        "",
-        "## Everything",
-        "",
-        *HEAD,
-        *(row.text() for row in found),
-    ]
-    return "\n".join(lines) + "\n"
+        for kind, shapes in product(options.kinds, options.shapes):
+            scene = api.fit(picture, shapes, kind=kind, **fit)
+            yield from rows(name, scene, picture, kind, options.profiles)
 
 
 def _worst(found: list[Row], shapes: int) -> Iterator[str]:
@@ -216,29 +193,38 @@ def _sizes(found: list[Row]) -> Iterator[str]:
         yield f"| {profile} | {kind} | {shapes} | {size:,} | {packed:,} |"
 
 
-def main() -> None:
-    """Entry point of `python -m sdf2vec.bench.svg`."""
-    parser = argparse.ArgumentParser(
-        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
-    )
-    parser.add_argument("pictures", nargs="*", type=Path)
-    parser.add_argument("--shapes", default="64,256", help="numbers, separated by commas")
-    parser.add_argument("--kinds", default="circle,ellipse,box,triangle,displaced")
-    parser.add_argument("--profiles", default=",".join(RENDERERS))
-    parser.add_argument("--preset", default="balanced")
-    parser.add_argument("--max-falloff", type=float, help="softest edge that a shape may have")
-    parser.add_argument("--seed", type=int, default=0)
-    parser.add_argument("-o", "--output", type=Path, required=True)
-    options = parser.parse_args()
-    names = "".join(f" {path.name}" for path in options.pictures)
-    softest = "" if options.max_falloff is None else f" --max-falloff {options.max_falloff:g}"
-    command = (
-        f"python -m sdf2vec.bench.svg{names} --shapes {options.shapes} --kinds {options.kinds} "
-        f"--profiles {options.profiles} --preset {options.preset} --seed {options.seed}{softest} -o {options.output}"
-    )
-    found = sorted(measured(options), key=lambda row: row.shapes)
-    write_atomically(options.output, page(found, command).encode())
+ABOUT = """dB: PSNR against the torch render at the fitted size, and at twice that. Mean error: signed, in 8-bit \
+levels. dB to the picture: PSNR against the original; gained: by how much more than the render's. Seconds: wall time \
+at the fitted size, the start of rsvg-convert and Firefox included. Chromium draws on the CPU."""
 
 
-if __name__ == "__main__":
-    main()
+def add_choices(parser: argparse.ArgumentParser) -> None:
+    """The flags of `sdf2vec bench svg`."""
+    parser.add_argument("pictures", nargs="*", type=choices.picture, metavar="PICTURE")
+    choices.add_shapes(parser)
+    kinds = choices.names("kind", (*KINDS, MIXED))
+    choices.add_list(
+        parser, "--kinds", kinds, "circle,ellipse,box,triangle,displaced", "a fit of each of them"
+    )
+    profiles = choices.names("profile", RENDERERS)
+    choices.add_list(parser, "--profiles", profiles, ",".join(RENDERERS), "how SVGs are made")
+    choices.add_fit(parser, "preset", "max_falloff", "seed")
+
+
+def pages(options: argparse.Namespace, asked: Asked) -> Iterator[Page]:
+    """One page: the worst of each renderer over all drawings, sizes, then everything."""
+    found = []
+    for row in measured(options, choices.fit_of(options)):
+        asked.say(row.text())
+        found.append(row)
+    found.sort(key=lambda row: row.shapes)
+    worst = (line for shapes in sorted(set(options.shapes)) for line in _worst(found, shapes))
+    yield asked.page(
+        "SVG against the render: measured",
+        ABOUT,
+        "\n".join(worst).strip(),
+        "## Bytes",
+        "\n".join(_sizes(found)),
+        "## Everything",
+        "\n".join((*HEAD, *(row.text() for row in found))),
+    )

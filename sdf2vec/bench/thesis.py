@@ -1,19 +1,24 @@
 """The thesis' tables 5.1 and 5.2 again: its printed FLIP, its preset here, and `balanced` with the same shapes.
 
-    python -m sdf2vec.bench.thesis PICTURE -o docs/thesis.md
-
 The printed values are those of its own picture, woman_darkhair at 512 × 512.
 """
 
 from __future__ import annotations
 
 import argparse
-from collections.abc import Iterator
-from pathlib import Path
+from collections.abc import Callable, Iterator
+from typing import TYPE_CHECKING
 
-from ..files import write_atomically
+from ..deferred import deferred
 from ..image import Picture, load
-from .fits import measured
+from ..scene import Scene
+from . import choices
+from .table import Asked, Page
+
+if TYPE_CHECKING:
+    from .fits import Fitted
+
+measured: Callable[..., tuple[Fitted, Scene]] = deferred("sdf2vec.bench.fits", "measured")
 
 COLUMNS = (
     ("circle", 1),
@@ -56,33 +61,17 @@ def rows(picture: Picture) -> Iterator[str]:
             yield f"| {count} | {loss} | {name} | {value:.4f} | {theirs.flip:.4f} | {flip:.4f} | {spent} |"
 
 
-def page(name: str, output: Path) -> str:
-    """The whole table."""
-    return (
-        "\n\n".join(
-            (
-                "# The thesis' tables, run again",
-                f"    python -m sdf2vec.bench.thesis PICTURE -o {output.as_posix()}",
-                "FLIP, lower is better; one seed. Thesis: printed in its tables 5.1 and 5.2, made on a CUDA GPU. "
-                "`thesis` here: its method by the fused kernels, on the CPU; what it leaves open is stated in "
-                "`fit/presets.py`. `balanced`: the default fit with the same kind, number and compositing, by "
-                "its own loss. Where shapes are joined, the number counts shapes, not layers. CPU seconds include "
-                "compiling kernels when a kind is new.",
-                "\n".join(rows(load(name))),
-            )
-        )
-        + "\n"
-    )
+ABOUT = """FLIP, lower is better; one seed. Thesis: printed in its tables 5.1 and 5.2, made on a CUDA GPU. `thesis` \
+here: its method by the fused kernels, on the CPU; what it leaves open is stated in `fit/presets.py`. `balanced`: \
+the default fit with the same kind, number and compositing, by its own loss. Where shapes are joined, the number \
+counts shapes, not layers. CPU seconds include compiling kernels when a kind is new."""
 
 
-def main() -> None:
-    """Entry point of `python -m sdf2vec.bench.thesis`."""
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("picture", metavar="PICTURE")
-    parser.add_argument("-o", "--output", type=Path, required=True)
-    options = parser.parse_args()
-    write_atomically(options.output, page(options.picture, options.output).encode())
+def add_choices(parser: argparse.ArgumentParser) -> None:
+    """The flags of `sdf2vec bench thesis`."""
+    parser.add_argument("picture", type=choices.picture, metavar="PICTURE")
 
 
-if __name__ == "__main__":
-    main()
+def pages(options: argparse.Namespace, asked: Asked) -> Iterator[Page]:
+    """One page: a row for each figure that the thesis has printed."""
+    yield asked.page("The thesis' tables, run again", ABOUT, asked.told(rows(load(options.picture))))

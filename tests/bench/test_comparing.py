@@ -10,13 +10,13 @@ import pytest
 
 from sdf2vec.bench import measuring
 from sdf2vec.bench.comparing import Plan, compare
-from sdf2vec.bench.methods import counts_of, method_of, methods_of
+from sdf2vec.bench.methods import method_of, methods_of
 from sdf2vec.bench.pareto import Point, front
 from sdf2vec.bench.peers import PEERS, Call, programs_of
-from sdf2vec.cli import main
 from sdf2vec.engines import chromium
 from sdf2vec.errors import Sdf2vecError
 from sdf2vec.image import encode_png, load
+from tests.bench.command import bench
 from tests.fit.fitting import picture
 
 GREY = '<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 48 32"><rect width="48" height="32" fill="#808080"/></svg>'
@@ -33,7 +33,6 @@ def test_methods_are_paces_changed_by_words():
         "thesis:ssim",
         "fast:sharp",
     ]
-    assert counts_of("64,256,64") == [64, 256]
 
 
 @pytest.mark.parametrize("text", ["fastest", "fast:red", "fast:union"])
@@ -82,12 +81,6 @@ def program(folder, text):
     path.write_text(f"#!/bin/sh\n{text}\n")
     path.chmod(path.stat().st_mode | stat.S_IXUSR)
     return str(path)
-
-
-def bench(*arguments):
-    with pytest.raises(SystemExit) as end:
-        main(["bench", *map(str, arguments)])
-    return end.value.code
 
 
 @pytest.fixture(scope="module")

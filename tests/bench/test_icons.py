@@ -1,7 +1,5 @@
 """Icons through the bench: what is counted of them, and who is nearer."""
 
-import sys
-
 import numpy as np
 import pytest
 
@@ -10,6 +8,7 @@ from sdf2vec.bench import icons
 from sdf2vec.bench.icons import Drawing, Icon
 from sdf2vec.bench.recovery import BEST
 from sdf2vec.engines import resvg
+from tests.bench.command import bench
 
 SVG = (
     '<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 8 8">'
@@ -89,7 +88,7 @@ def test_which_icons_are_taken(tmp_path):
     assert icons.chosen(tmp_path / "none", 4) == []
 
 
-def test_the_command_writes_a_page(require_engine, tmp_path, monkeypatch):
+def test_the_command_writes_a_page(require_engine, tmp_path):
     """One that resvg refuses and an empty one are left out."""
     require_engine("resvg")
     folder = tmp_path / "folder"
@@ -98,8 +97,7 @@ def test_the_command_writes_a_page(require_engine, tmp_path, monkeypatch):
     for name, text in texts.items():
         (folder / f"{name}.svg").write_text(text)
     output = tmp_path / "icons.md"
-    monkeypatch.setattr(sys, "argv", ["icons", str(folder), "--hands", "artist", "-o", str(output)])
-    icons.main()
+    assert bench("icons", folder, "--hands", "artist", "-o", output) == 0
     text = output.read_text()
     assert "| 1 icons, medians |" in text
     assert "| artist | 2 | 0 | 5 | 1.00 |" in text

@@ -1,28 +1,17 @@
 """The command: its table, its figure, other tools' files."""
 
 import io
-import sys
 
 import numpy as np
 import pytest
 from PIL import Image
 
-from sdf2vec import Scene, Sdf2vecError, api
+from sdf2vec import Scene, api
 from sdf2vec.bench import known
 from sdf2vec.bench.known import Case, Result
 from sdf2vec.bench.known_drawing import svg_of
 from sdf2vec.bench.recovery import Verdict
-
-
-@pytest.fixture
-def command(monkeypatch):
-    """Runs the command with these words."""
-
-    def run(*words):
-        monkeypatch.setattr(sys, "argv", ["known", *map(str, words)])
-        known.main()
-
-    return run
+from tests.bench.command import bench
 
 
 def test_a_row_by_hand():
@@ -65,14 +54,12 @@ def test_the_figure_holds_the_first_of_each():
     assert [pixels[0, 0, 0], pixels[0, 6, 0], pixels[12, 0, 0], pixels[12, 6, 0]] == [0, 51, 153, 255]
 
 
-def test_the_command_writes_a_page_and_its_figure(require_engine, command, tmp_path):
+def test_the_command_writes_a_page_and_its_figure(require_engine, tmp_path):
     require_engine("resvg")
     output = tmp_path / "known.md"
-    command("--tool", "truth", "--seeds", 2, "--counts", "0,2", "-o", output)
+    assert bench("known", "--tools", "truth", "--seeds", 2, "--counts", "0,2", "-o", output) == 0
     text = output.read_text()
-    assert (
-        f"python -m sdf2vec.bench.known --shapes auto --tool truth --counts 0,2 --seeds 2 -o {output}" in text
-    )
+    assert "    sdf2vec bench known --tools truth --seeds 2 --counts 0,2 -o known.md\n" in text
     rows = [line.split(" | ") for line in text.splitlines() if line.startswith("| **")]
     assert [(row[0], row[3], row[8], row[9]) for row in rows] == [
         ("| **apart**", "1.00", "1.000", "1.000"),
@@ -82,23 +69,23 @@ def test_the_command_writes_a_page_and_its_figure(require_engine, command, tmp_p
     assert (tmp_path / "known.truth.png").read_bytes().startswith(b"\x89PNG")
 
 
-def test_another_tools_files(require_engine, command, tmp_path, capsys):
+def test_another_tools_files(require_engine, tmp_path, capsys):
     """The pictures are written; SVG files of the same names are judged, and one that is missing is named."""
     require_engine("resvg")
-    command("--pictures", tmp_path, "--seeds", 1, "--counts", 2, "--modes", "apart")
+    assert bench("known", "--pictures", tmp_path, "--seeds", 1, "--counts", 2, "--modes", "apart") == 0
     (picture,) = tmp_path.iterdir()
     case = Case("apart", 2, 0)
     assert picture.name == "apart-02-00.png"
     np.testing.assert_allclose(np.asarray(Image.open(picture)) / 255, case.known.pixels, atol=1e-6)
     picture.with_suffix(".svg").write_text(svg_of(case.known))
-    command("--svg", tmp_path, "--seeds", 1, "--counts", 2, "--modes", "apart")
-    assert "files, apart-02-00: 2 of 2 shapes, 2 right, 2 outlines, 99.0 dB" in capsys.readouterr().out
-    with pytest.raises(Sdf2vecError, match=r"apart-01-00\.svg: No such file"):
-        command("--svg", tmp_path, "--seeds", 1, "--counts", 1, "--modes", "apart")
+    assert bench("known", "--svg", tmp_path, "--seeds", 1, "--counts", 2, "--modes", "apart") == 0
+    assert "files, apart-02-00: 2 of 2 shapes, 2 right, 2 outlines, 99.0 dB" in capsys.readouterr().err
+    assert bench("known", "--svg", tmp_path, "--seeds", 1, "--counts", 1, "--modes", "apart") == 2
+    assert "apart-01-00.svg: No such file" in capsys.readouterr().err
 
 
 @pytest.mark.parametrize(("words", "told"), [((), "auto"), (("--shapes", "true"), 2)])
-def test_what_a_fit_is_told(monkeypatch, command, capsys, words, told):
+def test_what_a_fit_is_told(monkeypatch, capsys, words, told):
     """Nothing, or how many shapes there are and of which kinds; its seed is the scene's."""
     asked = []
 
@@ -107,7 +94,8 @@ def test_what_a_fit_is_told(monkeypatch, command, capsys, words, told):
         return Scene(picture.width, picture.height, ())
 
     monkeypatch.setattr(api, "fit", fit)
-    command(*words, "--seeds", 1, "--counts", 2, "--modes", "apart", "--preset", "fast")
+    asked_for = ("--seeds", 1, "--counts", 2, "--modes", "apart", "--preset", "fast")
+    assert bench("known", *words, *asked_for) == 0
     kind = {} if told == "auto" else {"kind": known.KINDS}
     assert asked == [(told, {"seed": 0, "preset": "fast"} | kind)]
-    assert "sdf2vec, apart-02-00: 0 of 2 shapes" in capsys.readouterr().out
+    assert "sdf2vec, apart-02-00: 0 of 2 shapes" in capsys.readouterr().err

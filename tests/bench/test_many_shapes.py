@@ -4,7 +4,8 @@ import pytest
 
 from sdf2vec import load
 from sdf2vec.bench import many_shapes
-from sdf2vec.bench.many_shapes import Took, export, row, scattered
+from sdf2vec.bench.export_worker import FORMS, export, scattered
+from sdf2vec.bench.many_shapes import Took, row
 from sdf2vec.export import EXPORTERS
 
 
@@ -20,8 +21,8 @@ def test_a_process_that_fails_says_why(monkeypatch):
     assert row("svg", [5, 6]) == "| svg | 1.2 s, 100 MB, 1,234 B | Error: too many |"
 
 
-@pytest.mark.parametrize("form", many_shapes.FORMS)
+@pytest.mark.parametrize("form", FORMS)
 def test_every_form_is_a_target_with_options(form):
-    target, options = many_shapes.FORMS[form]
+    target, options = FORMS[form]
     assert target in EXPORTERS
     assert set(options) <= {"layout", "svg_profile"}

@@ -5,7 +5,7 @@ import math
 import pytest
 
 from sdf2vec import Layer, Scene, Shape
-from sdf2vec.bench.speed import covered_pixels, operations
+from sdf2vec.bench.timing import covered_pixels, operations
 from sdf2vec.render.tensors import from_scene
 from sdf2vec.shapes import KINDS
 
