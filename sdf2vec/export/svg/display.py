@@ -28,6 +28,11 @@ class Contour(NamedTuple):
         first, *rest = corners
         return cls(first, tuple((corner,) for corner in rest))
 
+    @property
+    def begins_straight(self) -> bool:
+        """Whether its first segment is a line."""
+        return bool(self.segments) and len(self.segments[0]) == 1
+
 
 @dataclass(frozen=True)
 class Path:

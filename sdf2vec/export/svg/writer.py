@@ -271,7 +271,8 @@ class _Writer:
 
     @element.register
     def _(self, geometry: Path, look: Attributes) -> Element:
-        data = "".join(map(self._relative, geometry.contours))
+        alone = len(geometry.contours) == 1
+        data = "".join(self._relative(contour, alone) for contour in geometry.contours)
         return self._with(self.svg.path(data), look | {"fill-rule": "evenodd"})
 
     def _with(self, element: Element, look: Mapping[str, str | None]) -> Element:
@@ -312,10 +313,14 @@ class _Writer:
     def _joined(self, points: Points) -> str:
         return " ".join(f"{self.number(x)} {self.number(y)}" for x, y in points.tolist())
 
-    def _relative(self, contour: Contour) -> str:
-        """Path data by how far each point is from where its segment begins; rounding does not add up."""
+    def _relative(self, contour: Contour, alone: bool = True) -> str:
+        """Path data by how far each point is from where its segment begins; rounding does not add up.
+
+        Lines right after the `m` that a path begins with need no letter; any other `m` would count from the last start.
+        """
         x, y = contour.start
-        parts, last = [f"M{self.fine(x)} {self.fine(y)}"], ""
+        begins, last = ("m", "l") if alone and contour.begins_straight else ("M", "")
+        parts = [f"{begins}{self.fine(x)} {self.fine(y)}"]
         for segment in contour.segments:
             steps = [
                 (round(a - x, self.drawing.digits), round(b - y, self.drawing.digits)) for a, b in segment

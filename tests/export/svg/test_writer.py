@@ -110,7 +110,7 @@ def test_compact_words():
     usual, again, other = root[-1]
     assert usual.attrib == again.attrib
     assert usual.attrib["color"] == "#f00"
-    assert usual.attrib["d"] in ("M10 10l20 0-20 20z", "M30 10l-20 20 0-20z", "M10 30l0-20 20 0z")
+    assert usual.attrib["d"] in ("m10 10 20 0-20 20z", "m30 10-20 20 0-20z", "m10 30 0-20 20 0z")
     assert "stroke-width" not in usual.attrib
     assert other.get("stroke-width") == "14"
     rules = root.findtext(f"{NAMESPACE}style", "")
@@ -121,3 +121,10 @@ def test_compact_words():
 def test_a_turned_ellipse():
     made = last(Figure(EllipseOutline((20.0, 30.0), (10.0, 5.0), math.pi / 6), RED))
     assert made.attrib == {"rx": "10", "ry": "5", "transform": "translate(20 30)rotate(30)", "fill": "#f00"}
+
+
+def test_each_contour_of_several_begins_where_it_is():
+    """A second `m` would count from where the first contour began."""
+    contours = [Contour.straight(((x, x), (x + 4.0, x), (x, x + 4.0))) for x in (10.0, 20.0)]
+    assert last(Figure(Path(tuple(contours)), RED), digits=0).get("d") == "M10 10l4 0-4 4zM20 20l4 0-4 4z"
+    assert last(Figure(Path(tuple(contours[:1])), RED), digits=0).get("d") == "m10 10 4 0-4 4z"
