@@ -8,6 +8,7 @@ from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from typing import Any
 
+from .bench.benches import BENCHES
 from .declared import Option, check_choice, options_of
 from .deferred import deferred
 from .export import EXPORTERS
@@ -71,7 +72,7 @@ def script(shell: str, parsers: Mapping[str, argparse.ArgumentParser]) -> str:
         abouts={
             name: (parser.description or "").split(":")[0].split(".")[0] for name, parser in parsers.items()
         },
-        shells=SHELLS,
+        words={"completion": SHELLS, "bench": tuple(BENCHES)},
     )
     return script
 

@@ -44,6 +44,9 @@ def script(folder, run):
         (["export", "--anim"], {"--animate"}),
         (["render", "--anim"], {""}),
         (["completion", ""], {"bash", "zsh", "fish"}),
+        (["bench", "sh"], {"shaders"}),
+        (["bench", "pho"], {"photo.jpg"}),
+        (["check", "sh"], {""}),
     ],
 )
 def test_what_bash_offers(script, words, offered):
