@@ -243,7 +243,8 @@ class Filters:
     of Y across and down: first order, second order.
     """
 
-    to_planes: Tensor  # [8, 3] from linear RGB
+    opponents: Tensor  # [8] int64: which of Y, Cx and Cz each plane is of
+    to_opponent: Tensor  # [3, 3] from linear RGB
     across: Tensor  # [8, 1, 1, K]
     down: Tensor  # [8, 1, K, 1]
 
@@ -251,7 +252,8 @@ class Filters:
         """[B, 3, H, W] to [B, 8, H, W]."""
         reach = self.across.shape[3] // 2
         padded = F.pad(linear, (reach, reach, reach, reach), mode="replicate")
-        planes: Tensor = (self.to_planes @ padded.flatten(2)).unflatten(2, padded.shape[2:])
+        opponent = (self.to_opponent @ padded.flatten(2)).unflatten(2, padded.shape[2:])
+        planes: Tensor = opponent[:, self.opponents]
         for kernels in (self.across, self.down):
             planes = F.conv2d(planes, kernels, groups=len(kernels))
         return planes
@@ -260,13 +262,14 @@ class Filters:
 @cache
 def filters_for(dtype: torch.dtype, device: torch.device) -> Filters:
     """FLIP's filters for pictures of a type on a device."""
-    planes, across, down = zip(*_bank(), strict=True)
+    opponents, across, down = zip(*_bank(), strict=True)
     tensors = (
-        _to_opponent()[planes, :],
+        _to_opponent(),
         torch.stack(across)[:, None, None, :],
         torch.stack(down)[:, None, :, None],
     )
-    return Filters(*(tensor.to(device, dtype).contiguous() for tensor in tensors))
+    which = torch.tensor(opponents, device=device)
+    return Filters(which, *(tensor.to(device, dtype).contiguous() for tensor in tensors))
 
 
 def _to_opponent() -> Tensor:

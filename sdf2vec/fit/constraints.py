@@ -16,6 +16,7 @@ from ..units import BACKGROUND, LONGEST, Room
 
 ALMOST = 0.999  # of the most that a number may be: there it still changes something
 NEWTON_STEPS = 6  # towards the least thickness, at most
+ENOUGH = 1.0001  # times the least thickness is aimed at: rounding must not leave a shape just below it
 FLAT = 0.1  # squared derivative of a thickness, which is 1 and more unless the shape is next to a point
 GOLDEN = 2.39996  # radians; multiples of it never meet
 
@@ -53,7 +54,7 @@ def _thicken(group: Group, part: int, least: float) -> bool:
             return False
         grads = torch.autograd.grad(thickness.sum(), columns, allow_unused=True, materialize_grads=True)
     slope = torch.stack(grads).square().sum(0)
-    step = (least - thickness).detach() / slope.clamp(min=FLAT)
+    step = (ENOUGH * least - thickness).detach() / slope.clamp(min=FLAT)
     for index, (values, grad) in enumerate(zip(group.shape(part), grads, strict=True)):
         away = least * math.cos(GOLDEN * index)  # a point may grow in any way
         move = torch.where(slope < FLAT, away, grad * step)

@@ -25,15 +25,17 @@ class Flip(AnalyticLoss):
         seen = paper.appearance(target, paper.SMOOTH)
         self.target: Float32Array = torch.cat([seen.lab, seen.features], dim=1).numpy()  # [B, 5, H, W]
         filters = paper.filters_for(target.dtype, target.device)
-        self.to_planes: Float32Array = filters.to_planes.numpy()
+        self.mixing = filters.opponents.numpy(), filters.to_opponent.numpy()
         self.across: Float32Array = filters.across.flatten(1).numpy()
         self.down: Float32Array = filters.down.flatten(1).numpy()
+        self.turned = tuple(np.ascontiguousarray(each[:, ::-1]) for each in (self.across, self.down))
         height, width = target.shape[1:]
-        wider = width + self.across.shape[1] // 2 * 2
+        ends = self.across.shape[1] - 1
         # Scratch, kept: fresh memory costs more.
         self.planes = np.empty((len(self.down), height, width), np.float32)
         self.seeds = np.empty_like(self.planes)
-        self.scratch = np.empty((height, 3, wider), np.float32), np.empty((height, wider), np.float32)
+        self.scratch = tuple(np.empty((height, 3, width + ends), np.float32) for _ in range(2))
+        self.wide = np.zeros((height, width + 2 * ends), np.float32)
 
     def value_and_gradient(self, render: Float32Array) -> tuple[float, Float32Array]:
         """Mean FLIP over the grounds and pixels, and its derivative by the render."""
@@ -58,12 +60,14 @@ class Flip(AnalyticLoss):
             filter_across,
             LINEARISE.address,
             image,
-            self.to_planes,
+            *self.mixing,
             self.across,
             *self.scratch,
             self.planes,
             slopes,
         )
         total = each(compare, COMPARE.address, self.planes, self.down, target, self.softness, self.seeds)
-        each(carry_back, self.seeds, self.to_planes, self.across, self.down, slopes, *self.scratch, grad)
+        across, down = self.turned
+        scratch = (*self.scratch, self.wide)
+        each(carry_back, self.seeds, *self.mixing, across, self.down, down, slopes, *scratch, grad)
         return total, grad

@@ -161,9 +161,10 @@ def test_round_shapes_are_thickened_too():
     )
     enforce_min_thickness(tensors, 0.02)
     circle, ellipse, box = tensors.groups
-    assert float(circle.of("radius", 0)) == pytest.approx(0.01)
-    assert ellipse.of("radii", 0).flatten().tolist() == pytest.approx([0.3, 0.01])
-    assert box.of("half_size", 0).flatten().tolist() == pytest.approx([0.01, 0.01])
+    enough = pytest.approx(0.01, rel=2e-4)  # a little more than asked for
+    assert float(circle.of("radius", 0)) == enough
+    assert ellipse.of("radii", 0).flatten().tolist() == [pytest.approx(0.3), enough]
+    assert box.of("half_size", 0).flatten().tolist() == [enough, enough]
 
 
 def test_corners_are_no_rounder_than_a_box_is_large():
