@@ -34,7 +34,7 @@ from .one_more import gain_of_one_more
 from .ramps import grounded
 from .settings import AUTO, Settings, preset_of
 from .simplify import sharing, simplified
-from .sparse import FLOOR, Round, Sizes, error_of, finished, grow, needed, pruned
+from .sparse import FLOOR, THOROUGH, USUAL, Round, Sizes, error_of, finished, grow, needed, pruned
 from .surroundings import View
 from .views import scaled, view_of
 
@@ -215,6 +215,9 @@ def _is_soft(picture: Picture) -> bool:
     return bool((image - target).square().mean() <= LEFT * before)
 
 
+THOROUGHLY = 12  # layers, at most, each of which is tried without in the end
+
+
 class Drawing:
     """The search for the few shapes that a picture is made of."""
 
@@ -253,8 +256,10 @@ class Drawing:
 
     def _finish(self) -> None:
         worst = 0.0 if self.settings.target_psnr is None else self.floor
-        if worst:
-            self.scene = pruned(self.scene, self.sizes, self.search, worst)
+        few = self.scene.layer_count <= THOROUGHLY
+        if worst or few:
+            hope = THOROUGH if few else USUAL
+            self.scene = pruned(self.scene, self.sizes, self.search, worst or FLOOR, hope)
         self.scene = simplified(self.scene, self.sizes.joint, self.search, worst)
         self.scene = finished(self.scene, self.sizes, self.search)
         self.scene = sharing(self.scene, self.sizes.last, worst)

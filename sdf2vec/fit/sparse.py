@@ -11,12 +11,14 @@ import operator
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, replace
 from functools import partial
+from typing import NamedTuple
 
 import torch
 
 from ..paints import BASE
 from ..render.reference import layers_at
 from ..render.tensors import SceneTensors
+from ..units import FALLOFF
 from .adam import adam_over
 from .candidates import Opening, cut_from, in_place_of
 from .constraints import enforce_min_thickness, project
@@ -39,11 +41,10 @@ MOVED = 0.98  # of the error, at most, after a layer was moved in the draw order
 UNSEEN = 0.5 / 255  # coverage
 HELPS = 0.92  # of the error before, at most, after as many rounds as there is patience for
 PATIENCE, CLOSE = 2, 10**-3.9  # rounds; mean squared error, 39 dB, below which there is none for a second
-NEEDLESS, HOPEFUL = 1.05, 6.0  # how much the error may rise by a layer taken out: after a descent; before it
+NEEDLESS = 1.05  # how much the error may rise by a layer taken out, after a descent
 THROUGH = 0.1  # of the error that a cut could take away where the picture is transparent, at least, for a try
 WORST = 0.1  # of all that is wrong, where a layer is whose shapes are exchanged
 RETHOUGHT = 2  # colours whose layers are found anew in a round, at most
-TRIED = 2  # layers that matter least, of which one may be taken out
 
 
 @dataclass(frozen=True)
@@ -53,6 +54,20 @@ class Sizes:
     search: View
     joint: View
     last: View
+
+
+class Hope(NamedTuple):
+    """Which layers may turn out to be needless: so many of those that matter least, without which the error rises at
+    most so many times before a descent. The others begin that so soft, in pixels, or softer: what is sharp stays sharp.
+    """
+
+    tried: int
+    rise: float
+    softness: float = 0.0
+
+
+USUAL = Hope(2, 6.0)
+THOROUGH = Hope(6, 1000.0, 4.0)  # at the end: of two that do the work of one, either matters
 
 
 @dataclass(frozen=True)
@@ -321,11 +336,13 @@ def descended(
 # --- what is not needed ---------------------------------------------------------------------------------------
 
 
-def pruned(scene: SceneTensors, sizes: Sizes, search: Search, worst: float = FLOOR) -> SceneTensors:
+def pruned(
+    scene: SceneTensors, sizes: Sizes, search: Search, worst: float = FLOOR, hope: Hope = USUAL
+) -> SceneTensors:
     """The scene without layers that it does as well without, or stays within the worst mean squared error."""
     error = error_of(scene, sizes.joint)
     while scene.layer_count:
-        fewer = _fewer(scene, sizes, search, max(NEEDLESS * error, worst))
+        fewer = _fewer(scene, sizes, search, max(NEEDLESS * error, worst), hope)
         if fewer is None:
             return scene
         scene, error = fewer
@@ -333,15 +350,16 @@ def pruned(scene: SceneTensors, sizes: Sizes, search: Search, worst: float = FLO
 
 
 def _fewer(
-    scene: SceneTensors, sizes: Sizes, search: Search, worst: float
+    scene: SceneTensors, sizes: Sizes, search: Search, worst: float, hope: Hope
 ) -> tuple[SceneTensors, float] | None:
     """The scene without one of the layers that matter least, and its error, if that is at most the worst."""
     rest = [without(scene, order) for order in range(scene.layer_count)]
     tried = [(error_of(fewer, sizes.joint), fewer) for fewer in rest]
-    least = sorted(tried, key=lambda pair: pair[0])[:TRIED]
-    hopeful = [pair for pair in least if pair[0] <= HOPEFUL * worst]
+    least = sorted(tried, key=lambda pair: pair[0])[: hope.tried]
+    hopeful = [pair for pair in least if pair[0] <= hope.rise * worst]
     for error, fewer in sorted(hopeful, key=lambda pair: count_numbers(pair[1])):
         if error > worst and fewer.layer_count:
+            fewer = _softened(fewer, hope.softness * search.pixel)
             if fewer.layer_count <= FEW // 2:
                 fewer = _each_improved(fewer, sizes.search, search)
             fewer = descended(fewer, sizes.joint, search, AFTER)
@@ -349,6 +367,16 @@ def _fewer(
         if error <= worst:
             return fewer, error
     return None
+
+
+def _softened(scene: SceneTensors, least: float) -> SceneTensors:
+    """The scene with no edge that is less soft than that, in scene units."""
+    made = detached(scene)
+    for group in made.groups:
+        for slot, values in group.values.items():
+            if slot.parameter.unit is FALLOFF:
+                values.clamp_(min=least)
+    return made
 
 
 def needed(made: Round, flat: bool, floor: float) -> float:

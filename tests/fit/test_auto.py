@@ -10,6 +10,7 @@ import torch
 from PIL import Image, ImageDraw
 
 from sdf2vec import Scene, Sdf2vecError, fit, fitted
+from sdf2vec.bench.known_scenes import known_scene
 from sdf2vec.engines import resvg
 from sdf2vec.fit import auto
 from sdf2vec.fit.auto import ground_of, is_flat
@@ -274,6 +275,15 @@ def test_a_soft_picture_takes_few_shapes():
     assert not is_flat(picture)
     assert found.scene.shape_count <= 8  # its edge is straight, ours a sigmoid
     assert quality(found.scene, picture).psnr >= 35
+
+
+@pytest.mark.parametrize(("count", "seed", "kinds"), [(1, 3, ["box"]), (2, 13, ["box", "circle"])])
+def test_a_soft_edge_is_no_shape_of_its_own(count, seed, kinds):
+    """Its colours are found one by one, as a sharp core, a halo and bars; in the end none but one shape is needed."""
+    known = known_scene(count, "apart", soft=True, seed=seed)
+    found = fitted(known.pixels)
+    assert kinds_of(found.scene) == kinds
+    assert quality(found.scene, load(known.pixels)).psnr > 55
 
 
 def test_a_jagged_disc_is_few_shapes():
