@@ -58,7 +58,8 @@ class Sizes:
 
 class Hope(NamedTuple):
     """Which layers may turn out to be needless: so many of those that matter least, without which the error rises at
-    most so many times before a descent. The others begin that so soft, in pixels, or softer: what is sharp stays sharp.
+    most so many times before a descent. The others begin that so soft or softer, in pixels of the picture where all
+    descend: what is sharp stays sharp.
     """
 
     tried: int
@@ -67,7 +68,7 @@ class Hope(NamedTuple):
 
 
 USUAL = Hope(2, 6.0)
-THOROUGH = Hope(6, 1000.0, 4.0)  # at the end: of two that do the work of one, either matters
+THOROUGH = Hope(6, 1000.0, 8.0)  # at the end: of two that do the work of one, either matters
 
 
 @dataclass(frozen=True)
@@ -342,11 +343,43 @@ def pruned(
     """The scene without layers that it does as well without, or stays within the worst mean squared error."""
     error = error_of(scene, sizes.joint)
     while scene.layer_count:
-        fewer = _fewer(scene, sizes, search, max(NEEDLESS * error, worst), hope)
+        limit = max(NEEDLESS * error, worst)
+        fewer = _bare(scene, sizes, search, limit, hope) if hope.softness else None
+        fewer = fewer or _fewer(scene, sizes, search, limit, hope)
         if fewer is None:
             return scene
         scene, error = fewer
     return scene
+
+
+def _bare(
+    scene: SceneTensors, sizes: Sizes, search: Search, worst: float, hope: Hope
+) -> tuple[SceneTensors, float] | None:
+    """The scene without all smaller layers that touch one, and its error, if that is at most the worst.
+
+    Together they may be the soft edge of that one.
+    """
+    covers, _ = layers_at(scene, *points_of(scene, sizes.joint))
+    areas, touching = covers.sum(1), _touching(scene, sizes.joint)
+    for order in areas.argsort(descending=True).tolist():
+        smaller = (touching[order] & (areas < areas[order])).nonzero()[:, 0].tolist()
+        if len(smaller) > 1:
+            fewer = scene
+            for other in reversed(smaller):
+                fewer = without(fewer, other)
+            fewer, error = _settled(fewer, sizes, search, hope)
+            if error <= worst:
+                return fewer, error
+    return None
+
+
+def _settled(scene: SceneTensors, sizes: Sizes, search: Search, hope: Hope) -> tuple[SceneTensors, float]:
+    """The scene after a descent from softer edges, and its error."""
+    scene = _softened(scene, hope.softness / min(sizes.joint.target.shape[1:]))
+    if scene.layer_count <= FEW // 2:
+        scene = _each_improved(scene, sizes.search, search)
+    scene = descended(scene, sizes.joint, search, AFTER)
+    return scene, error_of(scene, sizes.joint)
 
 
 def _fewer(
@@ -359,11 +392,7 @@ def _fewer(
     hopeful = [pair for pair in least if pair[0] <= hope.rise * worst]
     for error, fewer in sorted(hopeful, key=lambda pair: count_numbers(pair[1])):
         if error > worst and fewer.layer_count:
-            fewer = _softened(fewer, hope.softness * search.pixel)
-            if fewer.layer_count <= FEW // 2:
-                fewer = _each_improved(fewer, sizes.search, search)
-            fewer = descended(fewer, sizes.joint, search, AFTER)
-            error = error_of(fewer, sizes.joint)
+            fewer, error = _settled(fewer, sizes, search, hope)
         if error <= worst:
             return fewer, error
     return None
