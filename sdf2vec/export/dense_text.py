@@ -76,6 +76,5 @@ def _names() -> Iterator[str]:
 
 
 def brief(text: str) -> str:
-    """A text with half as much indentation and no empty lines."""
-    lines = (line for line in text.splitlines() if line)
-    return "".join(f"{' ' * ((len(line) - len(line.lstrip())) // 2)}{line.lstrip()}\n" for line in lines)
+    """A text without indentation and empty lines."""
+    return "".join(f"{line.lstrip()}\n" for line in text.splitlines() if line)
