@@ -38,6 +38,7 @@ from .sparse import FLOOR, THOROUGH, USUAL, Round, Sizes, error_of, finished, gr
 from .surroundings import View
 from .views import scaled, view_of
 
+THOROUGHLY = 12  # layers, at most, which in the end are tried without even where they matter
 SEARCH, JOINT, LAST = 56, 128, 320  # pixels squared
 FEW = 4  # shapes that are placed by trial, also where their number is given
 LEVELS = 3.5 / 255  # by which pixels of one flat colour differ at most
@@ -213,9 +214,6 @@ def _is_soft(picture: Picture) -> bool:
     before = (image - target).square().mean()
     find_discs(Painted(image, target, torch.ones(target.shape[1:])), DISCS)
     return bool((image - target).square().mean() <= LEFT * before)
-
-
-THOROUGHLY = 12  # layers, at most, each of which is tried without in the end
 
 
 class Drawing:

@@ -173,6 +173,13 @@ def without(scene: SceneTensors, order: int) -> SceneTensors:
     return replace(fewer, groups=groups)
 
 
+def _without_all(scene: SceneTensors, orders: list[int]) -> SceneTensors:
+    """The scene without the layers at these places of the draw order, which rise."""
+    for order in reversed(orders):
+        scene = without(scene, order)
+    return scene
+
+
 # --- descents -------------------------------------------------------------------------------------------------
 
 
@@ -239,10 +246,7 @@ def _rethought(scene: SceneTensors, sizes: Sizes, search: Search, floor: float) 
     if not 1 < scene.layer_count <= FEW or error <= floor:
         return scene
     for orders in _alike(scene, sizes.search)[:RETHOUGHT]:
-        rest = scene
-        for order in reversed(orders):
-            rest = without(rest, order)
-        opened = _opened(rest, orders[0])
+        opened = _opened(_without_all(scene, orders), orders[0])
         color = layer_at(scene, orders[0]).of(BASE.name, 0)
         around = Surroundings.of(opened, orders[0], sizes.search)
         other = instead_of(orders[0], color, around, search, floor)
@@ -364,10 +368,7 @@ def _bare(
     for order in areas.argsort(descending=True).tolist():
         smaller = (touching[order] & (areas < areas[order])).nonzero()[:, 0].tolist()
         if len(smaller) > 1:
-            fewer = scene
-            for other in reversed(smaller):
-                fewer = without(fewer, other)
-            fewer, error = _settled(fewer, sizes, search, hope)
+            fewer, error = _settled(_without_all(scene, smaller), sizes, search, hope)
             if error <= worst:
                 return fewer, error
     return None
