@@ -19,7 +19,7 @@ from .export.byte_limit import ByteLimit
 from .export.exported import Exported
 from .export.options import PICTURE, Options
 from .export.rounding import COARSEST, FINEST, Rounded, Rounding
-from .grain import DENSE, GRAINS, USUAL, Grain, is_few_and_sharp
+from .grain import DENSE, GRAINS, USUAL, Drawable, Grain, is_few_and_sharp
 from .scene import Scene
 from .steps import StepsOf
 
@@ -44,8 +44,10 @@ DENSEST = 30.0  # dB from the render; more shapes so coarse say more of a pictur
 
 Phase = Callable[[str], AbstractContextManager[object]]
 
-_drawable: Callable[[Scene, Views, Grain, Scene | None], Scene] = deferred("sdf2vec.fit.drawable", "drawable")
-_rounded: Callable[[Scene, Grain], Scene] = deferred("sdf2vec.fit.drawable", "rounded")
+_drawable: Callable[[Scene, Views, Grain, Scene | None], Drawable] = deferred(
+    "sdf2vec.fit.drawable", "drawable"
+)
+_rounded: Callable[[Scene, Grain], Drawable] = deferred("sdf2vec.fit.drawable", "rounded")
 _settled: Callable[[Scene, StepsOf, Views], Scene] = deferred("sdf2vec.fit.settling", "settled")
 _views_of: Callable[[Picture], Views] = deferred("sdf2vec.fit.settling", "views_of")
 _picture_of: Callable[[Scene], Picture] = deferred("sdf2vec.fit.conversion", "picture_of")
@@ -83,8 +85,8 @@ class Exports:
         made = self._made(exporter, scene, options)
         return replace(made, notes=(note, *made.notes))
 
-    def drawn(self, grain: Grain) -> Scene:
-        """The scene nearest to the picture that a small drawing of this grain can say."""
+    def drawn(self, grain: Grain) -> Drawable:
+        """What a small drawing of this grain can say that is nearest to the picture."""
         return self._drawn(self.scene, grain)
 
     def densest(self, target: str, options: Options) -> Exported:
@@ -151,10 +153,10 @@ class Exports:
             return None
         for grain in USUAL:
             drawn, most = self._drawn(scene, grain), self._most_lost(scene, grain)
-            if self._lost_by(scene, drawn) > most:
+            if self._lost_by(scene, drawn.scene) > most:
                 continue
             made = exporter.draw(drawn, options, grain)
-            lost = self._lost_by(scene, drawn, (made.error / 255) ** 2)
+            lost = self._lost_by(scene, drawn.scene, (made.error / 255) ** 2)
             if lost <= most:
                 note = f"{exporter.suffix[1:]}: drawn small, {self._told(scene, lost)}"
                 return replace(made, notes=(note, *made.notes))
@@ -207,15 +209,20 @@ class Exports:
                 yield partial(self._draw_small, draw, scene, options, grain)
 
     def _draw_small(
-        self, draw: Callable[[Scene, Options, Grain], Exported], scene: Scene, options: Options, grain: Grain
+        self,
+        draw: Callable[[Drawable, Options, Grain], Exported],
+        scene: Scene,
+        options: Options,
+        grain: Grain,
     ) -> Exported:
         made = draw(self._drawn(scene, grain), options, grain)
-        note = f"drawn small: {grain.units} steps along the shortest side, {grain.colors} of a colour"
+        blurs = ", layers blurred together" if grain.runs else ""
+        note = f"drawn small: {grain.units} steps along the shortest side, {grain.colors} of a colour{blurs}"
         return replace(made, notes=(note, *made.notes))
 
-    def _fit_small(self, scene: Scene, grain: Grain) -> Scene:
-        """The scene nearest to the picture that a drawing of this grain can say."""
-        coarser = self._drawn(scene, USUAL[0]) if grain in USUAL[1:] else None
+    def _fit_small(self, scene: Scene, grain: Grain) -> Drawable:
+        """What a drawing of this grain can say that is nearest to the picture."""
+        coarser = self._drawn(scene, USUAL[0]).scene if grain in USUAL[1:] else None
         if coarser and self._lost_by(scene, coarser) > LITTLE:
             coarser = None
         with self._phase("fit drawing"):

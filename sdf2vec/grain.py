@@ -1,4 +1,4 @@
-"""How coarse a small drawing is, and which scenes it can draw as they are."""
+"""How coarse a small drawing is, which scenes it can draw, and what it then draws."""
 
 from __future__ import annotations
 
@@ -15,33 +15,58 @@ class Grain(NamedTuple):
     """How coarse a small drawing is: `units` along the shortest side, how many `softnesses` of two pixels and more,
     steps of `colors` and `opacities`. One more filter is worth blurring this share of the canvas' pixels in vain.
 
-    Of fewer layers than MANY, fewer softnesses (but `fewest`) and filters say as much.
+    `runs`: into how many runs of layers, at most, it is cut, each blurred as one; 0 where each layer is blurred alone.
+    Of fewer layers than MANY, fewer softnesses (but `fewest`) and filters say as much, and one run.
     """
 
     units: int
     softnesses: int
     colors: int
     opacities: int
-    filter: float
+    filter: float = 1.0
     fewest: int = 3
+    runs: int = 0
 
     def for_layers(self, count: int) -> Grain:
         """For a drawing of so many layers."""
         share = math.sqrt(min(1.0, max(count, 1) / MANY))
         softnesses = min(self.softnesses, max(self.fewest, round(self.softnesses * share)))
-        return self._replace(softnesses=softnesses, filter=self.filter / share)
+        runs = self.runs if count >= MANY else min(self.runs, 1)
+        return self._replace(softnesses=softnesses, filter=self.filter / share, runs=runs)
+
+    @property
+    def name(self) -> str:
+        """What it is called in tables: by its grid, `runs` before that of one with runs."""
+        return f"{'runs' if self.runs else 'small'} {self.units}"
 
 
 GRAINS = (  # finest first
     Grain(4096, 20, 255, 100, 0.8, fewest=20),
     Grain(1024, 12, 255, 100, 0.8, fewest=5),
     Grain(512, 12, 255, 20, 0.6, fewest=5),
-    Grain(256, 8, 51, 10, 1.0),
-    Grain(200, 5, 25, 10, 1.5),
-    Grain(160, 3, 15, 10, 2.0),
+    Grain(256, 8, 51, 10),
+    Grain(256, 0, 51, 10, runs=3),
+    Grain(200, 0, 25, 10, runs=3),
+    Grain(160, 0, 15, 10, runs=3),
 )
-DENSE = GRAINS[3]  # more shapes of it say more of a picture than fewer finer ones, or yet more coarser ones
+DENSE = GRAINS[4]  # more shapes of it say more of a picture than fewer finer ones, or yet more coarser ones
 USUAL = GRAINS[2::-1]  # what is tried where no size is asked for, smallest first
+
+
+class Run(NamedTuple):
+    """Layers that follow each other and are blurred as one: how many, by which standard deviation in scene units."""
+
+    layers: int
+    deviation: float
+
+
+class Drawable(NamedTuple):
+    """A scene whose numbers a small drawing can say. With `runs`, which together are all of its layers, these are sharp
+    and each run is blurred; without, each layer by its own falloff.
+    """
+
+    scene: Scene
+    runs: tuple[Run, ...] = ()
 
 
 def is_drawable(scene: Scene) -> bool:

@@ -40,9 +40,7 @@ Pixels = Float64Array  # [H, W, 4] premultiplied RGBA, 0..1
 
 ALPHA = "alpha: "  # before the names of pictures with alpha
 BLURRING = ("resvg", "librsvg", "chromium", "firefox")
-SMALL = {
-    f"small {grain.units}": grain for grain in GRAINS
-}  # small drawings, fitted to the picture, by their grids
+SMALL = {grain.name: grain for grain in GRAINS}  # small drawings, fitted to the picture
 RENDERERS = {
     "filters": BLURRING,
     **dict.fromkeys(SMALL, BLURRING),

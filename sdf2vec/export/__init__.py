@@ -9,7 +9,7 @@ from functools import partial
 from ..compact_file import MAGIC
 from ..deferred import deferred
 from ..errors import Sdf2vecError
-from ..grain import Grain
+from ..grain import Drawable, Grain
 from ..scene import MAX_SHAPES, Scene
 from ..scene_file import FORMAT
 from .exported import MARK, Exported
@@ -24,12 +24,10 @@ class Exporter:
     `accepts` says which scenes `write` takes, `most_shapes` how many shapes they may have; `heeds` names the options
     that matter to it; other files that it may write end in `beside`. `forms(scene, options)`, where there are several,
     begin with that of `write` and take ever fewer bytes; each is made when it is called. Where it `draws` a scene,
-    `draw` makes a small drawing of one whose numbers a grain can say (`fit.drawable`), `sketch` one of about that size,
-    quickly; where there is a `rounding` of a
-    scene, that says how coarse its numbers may be (`fit.settling`).
-    `holds_drawing`: an SVG is in it. A file that ends in one of
-    `endings` is taken to be for it; one that holds `mark` was made by it. `is_text`: it writes text, not bytes;
-    `is_picture`: the render.
+    `draw` makes a small drawing of what a grain can say of one (`fit.drawable`), `sketch` one of about that size,
+    quickly; where there is a `rounding` of a scene, that says how coarse its numbers may be (`fit.settling`).
+    `holds_drawing`: an SVG is in it. A file that ends in one of `endings` is taken to be for it; one that holds `mark`
+    was made by it. `is_text`: it writes text, not bytes; `is_picture`: the render.
     """
 
     suffix: str
@@ -42,8 +40,8 @@ class Exporter:
     mark: bytes = MARK.encode()
     forms: Callable[[Scene, Options], Sequence[Callable[[], Exported]]] | None = None
     draws: Callable[[Scene, Options], bool] = lambda scene, options: False
-    draw: Callable[[Scene, Options, Grain], Exported] | None = None
-    sketch: Callable[[Scene, Options, Grain], Exported] | None = None
+    draw: Callable[[Drawable, Options, Grain], Exported] | None = None
+    sketch: Callable[[Drawable, Options, Grain], Exported] | None = None
     rounding: Callable[[Scene, Options], Rounding | None] = lambda scene, options: None
     holds_drawing: bool = False
     is_text: bool = True

@@ -76,10 +76,8 @@ def _nothing(picture: Picture, settings: Settings, view: View) -> Scene:
 
 
 def _sorts(settings: Settings) -> Iterator[Settings]:
-    """Soft and sharp shapes, and circles, which a shader says in few words; whatever the user has left open."""
-    edges = [None, 0.0] if settings.max_falloff is None else [settings.max_falloff]
-    for edge in edges:
-        yield structs.replace(settings, max_falloff=edge)
+    """Shapes as they are, and circles, which a shader says in few words; whatever the user has left open."""
+    yield settings
     if not settings.kind:
         yield structs.replace(settings, kind=("circle",))
 

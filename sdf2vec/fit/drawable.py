@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
+from dataclasses import replace
 from functools import partial
 
 import numpy as np
@@ -11,53 +13,91 @@ import torch
 from ..arrays import Float64Array
 from ..blend import EDGE_DEVIATION, SUBTRACTION
 from ..clusters import clustered
-from ..grain import Grain
+from ..grain import Drawable, Grain
 from ..layer import Slot
 from ..render.tensors import Group, SceneTensors, from_scene, to_scene
 from ..scene import Scene
 from ..shapes import KINDS
 from ..steps import Steps
 from ..units import COLOR, FALLOFF, OPACITY, POSITION
-from .settling import GOING_ON, Kept, Settling, Views, descend
+from .presets import MSE, Phase
+from .runs import Softening
+from .settling import GOING_ON, PHASES, Kept, Settling, Views, descend
 
 HARDLY = 0.6  # pixels: an edge of a smaller standard deviation is drawn sharp
 NARROWEST = (1.1, 1.5)  # pixels: of the narrowest blurs, on which renderers agree more or less
 LEAST_FREE = 1.8  # pixels, from which on softnesses are free
 LEAST = 2.15  # pixels, of a free one: renderers have nothing between it and the narrowest ones
+BLURRED = (  # of layers that are blurred in runs, no longer each by its falloff: at first nothing settles
+    Phase("blurring", 120, 256, rate=0.6, end_rate=0.3, loss=MSE),
+    Phase("settling", 120, 256, rate=0.3, end_rate=0.15, loss=MSE),
+    Phase("settling", 80, 320, rate=0.15, end_rate=0.04, loss=MSE),
+)
+COARSE, FINE = (256, 256, 320), (320, 384, 384)  # pixels squared, of these phases
+FINER = 1.3  # pixels: a run of a smaller standard deviation needs the finer ones
 GROWTH = 1.1  # of a triangle's spread, where its edge moves outwards
 GROWING = ("radius", "radii", "half_size", "corner_radius")  # what a shape is larger by; others have corners
 TINY = 1e-12
 
 
-def rounded(scene: Scene, grain: Grain) -> Scene:
+def rounded(scene: Scene, grain: Grain) -> Drawable:
     """The scene with all numbers such that a drawing of this grain can say them."""
     tensors = from_scene(scene)
-    for group in _settling(tensors, scene, grain):
+    softening, settling = _begun(tensors, scene, grain)
+    if softening:
+        softening.settle()
+    for group in settling:
         group.settle(1.0)
-    return to_scene(tensors, scene.width, scene.height)
+    return _ended(tensors, scene, softening)
 
 
-def drawable(scene: Scene, views: Views, grain: Grain, coarser: Scene | None = None) -> Scene:
+def drawable(scene: Scene, views: Views, grain: Grain, coarser: Scene | None = None) -> Drawable:
     """The same, as near to a picture, which is given at any resolution, as it comes by descending meanwhile.
 
     `coarser`: what came of the scene for a coarser drawing. Going on from it ends nearer, and takes half the time.
     """
     tensors = from_scene(coarser or scene)
-    settling = _settling(tensors, scene, grain)
-    phases = GOING_ON if coarser else None
-    descend(tensors, settling, views, scene, frozen=(FALLOFF.name,), phases=phases)
-    return to_scene(tensors, scene.width, scene.height)
+    softening, settling = _begun(tensors, scene, grain)
+    phases: Sequence[Phase] = GOING_ON if coarser else PHASES
+    if softening:
+        sides = FINE if softening.sharpest < FINER else COARSE
+        blurring, *phases = (
+            replace(phase, resolution=side) for phase, side in zip(BLURRED, sides, strict=True)
+        )
+        descend(tensors, (), views, scene, frozen=(FALLOFF.name,), phases=(blurring,), softening=softening)
+        softening.settle()
+    descend(tensors, settling, views, scene, frozen=(FALLOFF.name,), phases=phases, softening=softening)
+    return _ended(tensors, scene, softening)
 
 
-def _settling(tensors: SceneTensors, scene: Scene, grain: Grain) -> list[Settling]:
-    """The groups of a scene, whose layers have the falloffs of their classes from now on."""
-    if tensors.groups:
+def _begun(tensors: SceneTensors, scene: Scene, grain: Grain) -> tuple[Softening | None, list[Settling]]:
+    """The runs of a scene, if the grain has any, and its groups; their layers have the falloffs of their classes from
+    now on, in place, or none.
+    """
+    softening, count = None, tensors.layer_count
+    if grain.runs and any(_softest(group) > HARDLY * scene.pixel for group in tensors.groups):
+        softening = Softening.of(tensors, scene.pixel, grain.for_layers(count).runs)
+        for group in tensors.groups:
+            _grow(group, 0.5 * group.falloff, scene.pixel)
+            group.falloff.zero_()
+    elif count:
         own = torch.cat([group.falloff for group in from_scene(scene).groups])
-        _soften(tensors, own, scene.pixel, grain.for_layers(len(own)).softnesses)
-    return [
+        _soften(tensors, own, scene.pixel, grain.for_layers(count).softnesses)
+    settling = [
         Settling(group, _steps(group, grain, tensors.size), partial(_unfold, group, grain))
         for group in tensors.groups
     ]
+    return softening, settling
+
+
+def _softest(group: Group) -> float:
+    """The largest standard deviation of a group's edges, in scene units."""
+    return EDGE_DEVIATION * float(group.falloff.max())
+
+
+def _ended(tensors: SceneTensors, scene: Scene, softening: Softening | None) -> Drawable:
+    runs = softening.ended if softening else ()
+    return Drawable(to_scene(tensors, scene.width, scene.height), runs)
 
 
 # --- softnesses -----------------------------------------------------------------------------------------------

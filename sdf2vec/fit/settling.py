@@ -19,13 +19,14 @@ from ..render.tensors import Group, SceneTensors, from_scene, to_scene
 from ..scene import Scene
 from ..steps import Steps, StepsOf
 from ..threads import threads_of_its_own
-from .adam import adam_over
+from .adam import Moving, adam_over
 from .constraints import project
 from .joining import detached
 from .least_squares import SceneProblem, count_numbers, is_simple
 from .levenberg import descend as down
 from .losses import objective
 from .presets import MSE, Phase
+from .runs import RATE, Softening
 from .surroundings import View
 from .views import scaled
 
@@ -117,19 +118,20 @@ def descend(
     views: Views,
     scene: Scene,
     frozen: tuple[str, ...] = (),
-    phases: Sequence[Phase] | None = None,
+    phases: Sequence[Phase] = PHASES,
+    softening: Softening | None = None,
 ) -> None:
     """Goes down the difference from a picture while ever more numbers of a scene settle, until all have; in place.
 
-    By least squares where they are few enough. `frozen`: names of units of which nothing moves. `phases`: of Adam,
-    PHASES unless told.
+    By least squares where they are few enough, by the phases of Adam else. `frozen`: names of units of which nothing
+    moves. `softening`: layers are blurred in these runs, whose standard deviations are trained as well if free.
     """
     parts = [len(group.structure) for group in tensors.groups]
     with threads_of_its_own():
-        if 0 < count_numbers(tensors) <= SOLVED and max(parts) <= PARTS:
+        if 0 < count_numbers(tensors) <= SOLVED and max(parts) <= PARTS and not softening:
             _by_least_squares(tensors, settling, views(PHASES[-1].resolution), scene.pixel, frozen)
         elif 0 < tensors.layer_count <= LARGEST and sum(parts) <= PARTS:
-            _descend(tensors, settling, views, scene.pixel, frozen, phases or PHASES)
+            _descend(tensors, settling, views, scene.pixel, frozen, phases, softening)
     for group in settling:
         group.settle(1.0)
 
@@ -164,21 +166,34 @@ def _descend(
     pixel: float,
     frozen: tuple[str, ...],
     phases: Sequence[Phase],
+    softening: Softening | None,
 ) -> None:
     optimizer = adam_over(tensors, frozen=frozen)
+    if softening and softening.is_free:
+        optimizer.moving.append(Moving.of(softening.logs, RATE))
     done, total = 0, sum(phase.steps for phase in phases)
     for phase in phases:
         view = views(phase.resolution)
-        channels, height, width = view.target.shape
-        compose = composer(tensors, width, height, channels, total)
+        compose = _composer(tensors, view, total, softening)
         measure = objective(phase.loss, view.target, view.weights)
         for rate in phase.rates():
             for group in settling:
                 group.settle(done / total)
             optimizer.zero_grad()
-            measure(compose(tensors, width, height)).backward()
+            measure(compose()).backward()
             optimizer.step(rate)
             project(tensors, pixel)
             for group in settling:
                 group.hold()
             done += 1
+
+
+def _composer(
+    tensors: SceneTensors, view: View, times: int, softening: Softening | None
+) -> Callable[[], torch.Tensor]:
+    """What draws a scene, as it is then, at a view's size."""
+    channels, height, width = view.target.shape
+    if softening:
+        return lambda: softening.runs.composite(tensors, width, height, channels, times)
+    compose = composer(tensors, width, height, channels, times)
+    return lambda: compose(tensors, width, height)

@@ -8,7 +8,7 @@ import pytest
 from sdf2vec import Layer, Scene, Shape, fit
 from sdf2vec.fit.drawable import drawable, rounded, softnesses
 from sdf2vec.fit.settling import views_of
-from sdf2vec.grain import GRAINS, USUAL, Grain, is_drawable
+from sdf2vec.grain import DENSE, GRAINS, USUAL, Grain, is_drawable
 from sdf2vec.image import load
 from sdf2vec.quality import psnr_of
 from tests.scenes import random_scene
@@ -44,7 +44,7 @@ def test_all_numbers_can_be_said(descended):
     """On a canvas that is not square: corners and centres, the radius at which coverage is one half, colours."""
     scene = of_kinds(width=96, height=64)
     picture = load(np.random.default_rng(0).random((64, 96, 3)))
-    found = drawable(scene, views_of(picture), GRAIN) if descended else rounded(scene, GRAIN)
+    found = (drawable(scene, views_of(picture), GRAIN) if descended else rounded(scene, GRAIN)).scene
     half = np.array([0.75, 0.5])
     for layer in found.layers:
         (shape,) = layer.shapes
@@ -67,12 +67,12 @@ def test_what_rounding_loses_is_made_up_for():
     scene = fit(picture.pixels, 12, preset="fast", kind="triangle")
     near = psnr_of(scene, picture)
     plain, fitted = (
-        psnr_of(found, picture)
+        psnr_of(found.scene, picture)
         for found in (rounded(scene, GRAIN), drawable(scene, views_of(picture), GRAIN))
     )
     assert fitted > plain + 2.0
-    coarser = drawable(scene, views_of(picture), USUAL[0])
-    finer = drawable(scene, views_of(picture), GRAINS[0], coarser)
+    coarser = drawable(scene, views_of(picture), USUAL[0]).scene
+    finer = drawable(scene, views_of(picture), GRAINS[0], coarser).scene
     assert near - psnr_of(finer, picture) < min(0.5, near - psnr_of(coarser, picture))
 
 
@@ -81,7 +81,9 @@ def test_triangles_without_an_area_are_unfolded():
     level = Shape.of("triangle", (1, 0, 0), a=(-0.3, 0.1), b=(0.3, 0.1), c=(0.2, 0.1))
     slanted = Shape.of("triangle", (1, 0, 0), a=(-0.3, -0.3), b=(0.3, 0.3), c=(0.0, 0.0))
     scene = Scene(64, 64, (Layer((level,), 0.3), Layer((slanted,), 0.0), Layer((slanted,), 0.3)))
-    corners = [np.array(layer.shapes[0].parameters).reshape(3, 2) for layer in rounded(scene, GRAIN).layers]
+    corners = [
+        np.array(layer.shapes[0].parameters).reshape(3, 2) for layer in rounded(scene, GRAIN).scene.layers
+    ]
     _, (sharp_ab, sharp_ac), (soft_ab, soft_ac) = ((c[1] - c[0], c[2] - c[0]) for c in corners)
     assert np.ptp(corners[0][:, 1]) == pytest.approx(1 / 64, abs=1e-5)
     assert abs(sharp_ab[0] * sharp_ac[1] - sharp_ab[1] * sharp_ac[0]) > 1e-4
@@ -97,4 +99,5 @@ def test_what_can_not_be_drawn_small():
 
 def test_no_layers():
     scene = Scene(8, 8, (), (0.5, 0.5, 0.5))
-    assert rounded(scene, GRAIN) == scene
+    assert rounded(scene, GRAIN) == (scene, ())
+    assert rounded(scene, DENSE) == (scene, ())

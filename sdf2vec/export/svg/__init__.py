@@ -14,7 +14,7 @@ from msgspec import structs
 from ...deferred import deferred
 from ...errors import Sdf2vecError
 from ...files import one_line
-from ...grain import Grain, is_drawable
+from ...grain import Drawable, Grain, is_drawable
 from ...scene import Scene
 from ..exported import MARK, Exported
 from ..options import EXACT, FIXED, Accepts, Options
@@ -69,15 +69,15 @@ def draws(scene: Scene, options: Options) -> bool:
     return is_drawable(scene) and _planner(scene, options.svg_profile).can_be_small
 
 
-def small_svg(scene: Scene, options: Options, grain: Grain) -> Exported:
-    """A scene whose numbers a drawing of this grain can say, in the smallest text."""
-    drawing, error = drawn(scene, grain)
-    return Exported(_written(drawing, options, _small(scene, grain)), error=error)
+def small_svg(drawable: Drawable, options: Options, grain: Grain) -> Exported:
+    """What a drawing of this grain can say, in the smallest text."""
+    drawing, error = drawn(drawable, grain)
+    return Exported(_written(drawing, options, _small(drawable.scene, grain)), error=error)
 
 
-def sketch_svg(scene: Scene, options: Options, grain: Grain) -> Exported:
+def sketch_svg(drawable: Drawable, options: Options, grain: Grain) -> Exported:
     """The same, quickly: its size tells that of the drawing."""
-    return Exported(_written(sketched(scene, grain), options, _small(scene, grain)))
+    return Exported(_written(sketched(drawable, grain), options, _small(drawable.scene, grain)))
 
 
 def data_uri(scene: Scene, options: Options) -> Exported:
@@ -90,14 +90,14 @@ def data_uri_forms(scene: Scene, options: Options) -> list[Callable[[], Exported
     return [partial(_as_uri, make) for make in svg_forms(scene, options)]
 
 
-def small_data_uri(scene: Scene, options: Options, grain: Grain) -> Exported:
+def small_data_uri(drawable: Drawable, options: Options, grain: Grain) -> Exported:
     """The small drawing as a data URI."""
-    return _as_uri(partial(small_svg, scene, options, grain))
+    return _as_uri(partial(small_svg, drawable, options, grain))
 
 
-def sketch_data_uri(scene: Scene, options: Options, grain: Grain) -> Exported:
+def sketch_data_uri(drawable: Drawable, options: Options, grain: Grain) -> Exported:
     """The same, quickly."""
-    return _as_uri(partial(sketch_svg, scene, options, grain))
+    return _as_uri(partial(sketch_svg, drawable, options, grain))
 
 
 def _as_uri(make: Callable[[], Exported]) -> Exported:

@@ -98,11 +98,14 @@ class Figure:
 
 @dataclass(frozen=True)
 class Group:
-    """Items composited by themselves, then laid on what is below as one."""
+    """Items composited by themselves, blurred by a Gaussian of the standard deviation `blur`, then laid on what is
+    below as one.
+    """
 
     items: tuple[Figure, ...]
     opacity: float = 1.0
     name: str = ""
+    blur: float = 0.0
 
 
 Item = Figure | Group
@@ -121,6 +124,11 @@ class Drawing:
     digits: int
     ground: Ground
     items: tuple[Item, ...]
+
+    @property
+    def figures(self) -> list[Figure]:
+        """All of them, also those of groups."""
+        return [f for item in self.items for f in (item.items if isinstance(item, Group) else (item,))]
 
 
 def moved(color: Sequence[float], levels: float) -> Color:

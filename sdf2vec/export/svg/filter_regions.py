@@ -10,9 +10,11 @@ import numpy as np
 
 from ...outlines import EllipseOutline, PolygonOutline, RectangleOutline
 from .canvas import Points
-from .display import Drawing, Figure, Geometry, Path
+from .display import Drawing, Figure, Geometry, Group, Path
 
 REACH = 3.0  # standard deviations that a blur reaches
+USUAL_MARGIN = 0.1  # of a box, that a filter's region has by itself
+LARGER = 3.0  # times as large a region is as good
 SMALLEST = 0.1  # user units: no box is taken for smaller
 MOST = 128  # different margins of figures of one blur; of more, those are told apart that are of other steps
 MARGINS = (0.1, 0.2, 0.3, 0.45, 0.6, 0.8, 1.1, 1.5, 2, 3, 4.5, 7, 10, 20, 50, 100, 200, 500, 1000)
@@ -42,6 +44,27 @@ class Region(NamedTuple):
         """All that a blur can bring into the canvas."""
         reach = math.ceil(REACH * blur)
         return cls(-reach, -reach, drawing.width + 2 * reach, drawing.height + 2 * reach, True)
+
+
+def region_of_group(group: Group, drawing: Drawing) -> Region | None:
+    """What a group's blur needs of a drawing; none where the region that a filter has by itself holds that and is not
+    much larger: the box of what it is put on, and a tenth more on each side.
+    """
+    needed = Region.of_canvas(drawing, group.blur)
+    geometries = [figure.geometry for figure in group.items]
+    plain = [each for each in geometries if isinstance(each, PolygonOutline) and not each.rounding]
+    if len(plain) < len(geometries):
+        return needed
+    points = np.concatenate([np.array(each.points) for each in plain])
+    low, high = points.min(axis=0), points.max(axis=0)
+    margin, reach = USUAL_MARGIN * (high - low), REACH * group.blur
+    start = np.array([needed.left, needed.top])
+    end = start + np.array([needed.width, needed.height])
+    holds = (low - margin <= np.maximum(low - reach, start)) & (
+        high + margin >= np.minimum(high + reach, end)
+    )
+    area = float(np.prod(high - low + 2.0 * margin))
+    return None if holds.all() and area < LARGER * needed.area else needed
 
 
 def region_of(figure: Figure) -> Region:

@@ -25,6 +25,7 @@ from .display import (
     Drawing,
     Figure,
     Geometry,
+    Group,
     Item,
     LinearGradient,
     Outlines,
@@ -32,8 +33,9 @@ from .display import (
     RadialGradient,
     Stop,
 )
-from .filter_regions import Region, region_of, rounding_of, shared_regions
+from .filter_regions import Region, region_of, region_of_group, rounding_of, shared_regions
 from .outlines import convex, core, sides
+from .wording import compressible
 
 Element = Any  # svgwrite has no types
 Attributes = dict[str, str | None]
@@ -85,11 +87,10 @@ class _Writer:
         )
         self.ids: dict[str, str] = {}
         self.classes: dict[str, str] = {}
-        self.roundings = _usual_roundings(drawing.items)
-        self.strokes = style.compact and any(
-            isinstance(item, Figure) and rounding_of(item) > 0.0 for item in drawing.items
-        )
+        self.roundings = _usual_roundings(drawing.figures)
+        self.strokes = style.compact and any(rounding_of(figure) > 0.0 for figure in drawing.figures)
         self.regions = shared_regions(drawing, style.filter) if style.compact else {}
+        self.polygons = self._polygons() if style.compact else {}
 
     def text(self) -> str:
         """The document without its title, ids with PREFIX."""
@@ -114,7 +115,9 @@ class _Writer:
         if isinstance(item, Figure):
             return self.element(item.geometry, self._look(item) | {"id": name})
         group = self.svg.g(opacity=opacity_text(item.opacity), id=name)
-        made = [self.element(figure.geometry, self._painted(figure)) for figure in item.items]
+        if item.blur:
+            group["filter"] = self._group_filter(item)
+        made = [self.element(figure.geometry, self._look(figure)) for figure in item.items]
         for key in SHARED:
             values = {element.attribs.get(key) for element in made}
             if len(values) == 1 and None not in values:
@@ -128,7 +131,7 @@ class _Writer:
     # --- how a figure looks ---------------------------------------------------------------------------------
 
     def _look(self, figure: Figure) -> Attributes:
-        """The attributes of a figure that is in no group."""
+        """The attributes of a figure."""
         if not self.style.compact:
             return self._painted(figure)
         rounding = rounding_of(figure)
@@ -207,12 +210,20 @@ class _Writer:
         The opacity is part of it, for browsers round an attribute's down; not of a class, which all opacities share.
         """
         region = self.regions[figure] if self.style.compact else region_of(figure)
-        made = self.svg.filter(color_interpolation_filters="sRGB", **_attributes(region))
-        made.feGaussianBlur(None, stdDeviation=self.fine(figure.blur))
+        made = self._blur(figure.blur, region)
         opacity = opacity_text(figure.opacity)
         if opacity is not None and not self.style.compact:
             made.feComponentTransfer(None).feFuncA("linear", slope=opacity)
         return self._defined("b", made)
+
+    def _group_filter(self, group: Group) -> str:
+        """A blur of a whole group."""
+        return self._defined("b", self._blur(group.blur, region_of_group(group, self.drawing)))
+
+    def _blur(self, deviation: float, region: Region | None) -> Element:
+        made = self.svg.filter(color_interpolation_filters="sRGB", **(_attributes(region) if region else {}))
+        made.feGaussianBlur(None, stdDeviation=self.fine(deviation))
+        return made
 
     def _defined(self, letter: str, definition: Element) -> str:
         """A reference to a definition; the same one as before for equal content."""
@@ -256,12 +267,7 @@ class _Writer:
 
     @element.register
     def _(self, geometry: PolygonOutline, look: Attributes) -> Element:
-        if self.style.compact:
-            points = np.array(geometry.points)
-            turned = (np.roll(points, -first, axis=0) for first in range(len(points)))
-            data = min((self._relative(Contour.straight(pairs(corners))) for corners in turned), key=len)
-        else:
-            data = self._closed(geometry)
+        data = self.polygons[geometry] if self.style.compact else self._closed(geometry)
         return self._with(self.svg.path(data), look)
 
     @element.register
@@ -278,6 +284,23 @@ class _Writer:
     def _with(self, element: Element, look: Mapping[str, str | None]) -> Element:
         element.attribs.update({key: value for key, value in look.items() if value is not None})
         return element
+
+    def _polygons(self) -> dict[PolygonOutline, str]:
+        """Path data of each polygon, from the corner and the way round that compress best."""
+        figures = self.drawing.figures
+        found = dict.fromkeys(
+            figure.geometry for figure in figures if isinstance(figure.geometry, PolygonOutline)
+        )
+        colors = "".join(color_text(figure.fill)[1:] for figure in figures if isinstance(figure.fill, tuple))
+        return dict(zip(found, compressible([self._ways_round(each) for each in found], colors), strict=True))
+
+    def _ways_round(self, polygon: PolygonOutline) -> list[str]:
+        corners = np.array(polygon.points)
+        return [
+            self._relative(Contour.straight(pairs(np.roll(way, -first, axis=0))))
+            for way in (corners, corners[::-1])
+            for first in range(len(corners))
+        ]
 
     def _closed(self, outline: Outline) -> str:
         """Path data of an outline."""
@@ -348,9 +371,8 @@ def _attributes(region: Region) -> dict[str, str]:
     return box | ({"filterUnits": "userSpaceOnUse"} if region.in_user_units else {})
 
 
-def _usual_roundings(items: Sequence[Item]) -> dict[float, float]:
+def _usual_roundings(figures: Sequence[Figure]) -> dict[float, float]:
     """For each blur the rounding that most of its figures have."""
-    figures = [item for item in items if isinstance(item, Figure)]
     counted = Counter((figure.blur, rounding_of(figure)) for figure in figures if rounding_of(figure))
     return {blur: rounding for (blur, rounding), _ in reversed(counted.most_common())}
 

@@ -67,9 +67,9 @@ def assert_as_rendered(engine, text, scene, decibels, levels):
 def test_it_is_drawn_as_it_was_fitted(engine, grain, require_engine):
     """Triangles, boxes and circles of all softnesses, at the size fitted and at a larger one."""
     require_engine(engine)
-    scene = rounded(of_kinds(width=150, height=100), grain)
-    text = str(small_svg(scene, Options(), grain).data)
-    assert_as_rendered(engine, text, scene, 30, 1.5)
+    drawable = rounded(of_kinds(width=150, height=100), grain)
+    text = str(small_svg(drawable, Options(), grain).data)
+    assert_as_rendered(engine, text, drawable.scene, 30, 1.5)
 
 
 @pytest.mark.parametrize("engine", ["resvg", "chromium"])
@@ -77,10 +77,10 @@ def test_it_is_drawn_as_it_was_fitted(engine, grain, require_engine):
 def test_so_are_layers_of_several_shapes_and_gradients(engine, grain, require_engine):
     """Ellipses, displaced circles, unions, cut-outs and a ring, sharp and soft; and paints."""
     require_engine(engine)
-    scene = rounded(joined(width=150, height=100), grain)
-    text = str(small_svg(scene, Options(), grain).data)
+    drawable = rounded(joined(width=150, height=100), grain)
+    text = str(small_svg(drawable, Options(), grain).data)
     assert "Gradient" in text
-    assert_as_rendered(engine, text, scene, 32, 1.0)
+    assert_as_rendered(engine, text, drawable.scene, 32, 1.0)
 
 
 @pytest.mark.parametrize("units", [512, 1024])
@@ -89,9 +89,9 @@ def test_how_far_it_is_off_is_told(units, require_engine):
     require_engine("resvg")
     (grain,) = (grain for grain in GRAINS if grain.units == units)
     layers = tuple(replace(layer, falloff=0.0) for layer in joined(width=384, height=256).layers)
-    scene = rounded(Scene(384, 256, layers, (0.5, 0.5, 0.5)), grain)
-    made = small_svg(scene, Options(), grain)
-    wanted = draw(scene, 384, 256).permute(1, 2, 0).numpy()[..., :3]
+    drawable = rounded(Scene(384, 256, layers, (0.5, 0.5, 0.5)), grain)
+    made = small_svg(drawable, Options(), grain)
+    wanted = draw(drawable.scene, 384, 256).permute(1, 2, 0).numpy()[..., :3]
     off = 255.0 * np.sqrt(np.mean((drawn_by("resvg", str(made.data), 384, 256) - wanted) ** 2))
     assert 0.5 * off < made.error < 2.5 * off
 
