@@ -197,7 +197,7 @@ class Exports:
             return limit.share(exporter.sketch(_rounded(scene, grain), options, grain).raw)
 
         def may_fit(grain: Grain) -> bool:
-            return share_of(grain) <= ABOUT
+            return share_of(grain) <= (1.0 if grain.runs else ABOUT)
 
         near = self._near_enough(exporter, scene, options) if may_fit(USUAL[0]) else None
         if near:

@@ -29,11 +29,11 @@ NARROWEST = (1.1, 1.5)  # pixels: of the narrowest blurs, on which renderers agr
 LEAST_FREE = 1.8  # pixels, from which on softnesses are free
 LEAST = 2.15  # pixels, of a free one: renderers have nothing between it and the narrowest ones
 BLURRED = (  # of layers that are blurred in runs, no longer each by its falloff: at first nothing settles
-    Phase("blurring", 200, 256, rate=0.6, end_rate=0.3, loss=MSE),
-    Phase("settling", 200, 256, rate=0.3, end_rate=0.15, loss=MSE),
-    Phase("settling", 140, 320, rate=0.15, end_rate=0.04, loss=MSE),
+    Phase("blurring", 140, 256, rate=0.6, end_rate=0.3, loss=MSE),
+    Phase("settling", 130, 256, rate=0.3, end_rate=0.15, loss=MSE),
+    Phase("settling", 80, 320, rate=0.15, end_rate=0.04, loss=MSE),
 )
-COARSE, FINE = (256, 256, 320), (320, 384, 384)  # pixels squared, of these phases
+COARSE, FINE = (256, 256, 320), (256, 320, 384)  # pixels squared, of these phases
 FINER = 1.3  # pixels: a run of a smaller standard deviation needs the finer ones
 GROWTH = 1.1  # of a triangle's spread, where its edge moves outwards
 GROWING = ("radius", "radii", "half_size", "corner_radius")  # what a shape is larger by; others have corners

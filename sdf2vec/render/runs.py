@@ -5,8 +5,11 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import lru_cache
+from typing import Any, NamedTuple
 
 import torch
+from torch.autograd.function import once_differentiable
 
 from .draw import composer
 from .tensors import Group, SceneTensors
@@ -14,6 +17,7 @@ from .tensors import Group, SceneTensors
 REACH = 3.5  # standard deviations that a blur reaches
 NONE = 0.5  # pixels: a run of a smaller standard deviation is not blurred
 FINENESS = 1.5  # samples in a standard deviation, at least, where they are wider than pixels
+BLOCK = 32  # rows of a banded matrix that are multiplied at once
 ALPHA = 3  # place of alpha among the channels
 
 
@@ -97,17 +101,80 @@ class _Canvas:
         if not self.margin:
             return image
         # a sample is the mean of a square, which blurs as well, more than a pixel's
-        pixels = (deviation / self.pixel).square() - (self.step**2 - 1) / 12.0
-        down, across = (
-            self._weights(*sides, pixels) for sides in ((self.height, self.rows), (self.width, self.columns))
-        )
-        return down @ image @ across.T
+        variance = (deviation / self.pixel).square() - (self.step**2 - 1) / 12.0
+        made: torch.Tensor = _Blur.apply(image, variance, self)  # type: ignore[no-untyped-call]
+        return made
 
-    def _weights(self, pixels: int, samples: int, variance: torch.Tensor) -> torch.Tensor:
-        """How much of each sample there is in each pixel [pixels, samples]; variance in pixels squared."""
+    @lru_cache(maxsize=8)  # noqa: B019 (canvases are equal and few)
+    def bands(self, variance: float) -> tuple[_Band, _Band]:
+        """What blurs down and across; variance in pixels squared."""
+        return (
+            _Band.of(self._weights(self.height, self.rows, variance)),
+            _Band.of(self._weights(self.width, self.columns, variance)),
+        )
+
+    def _weights(self, pixels: int, samples: int, variance: float) -> torch.Tensor:
+        """How much of each sample there is in each pixel [pixels, samples]."""
         at = torch.arange(pixels) + 0.5 - pixels / 2
         of = (torch.arange(samples) + 0.5 - samples / 2) * self.step
         squared = (at[:, None] - of).square() / variance
         # numbers next to nothing take processors long
         weights = torch.where(squared < REACH**2, (-0.5 * squared.clamp(max=REACH**2)).exp(), 0.0)
         return weights / weights.sum(1, keepdim=True)
+
+
+class _Band(NamedTuple):
+    """A matrix [N, M] with few numbers but 0 in a row, near its diagonal: for each BLOCK of its rows those columns that
+    are not 0, and which they are.
+    """
+
+    blocks: tuple[tuple[torch.Tensor, int, int], ...]
+    transposed: _Band | None = None
+
+    @classmethod
+    def of(cls, matrix: torch.Tensor) -> _Band:
+        """With its transposed."""
+        return cls(_blocks(matrix), cls(_blocks(matrix.T)))
+
+    def __matmul__(self, image: torch.Tensor) -> torch.Tensor:
+        """Times an image [C, M, W]: [C, N, W]."""
+        return torch.cat([block @ image[:, low:high] for block, low, high in self.blocks], dim=1)
+
+
+def _blocks(matrix: torch.Tensor) -> tuple[tuple[torch.Tensor, int, int], ...]:
+    used = (matrix != 0).byte()
+    lows, behind = used.argmax(1).tolist(), used.flip(1).argmax(1).tolist()
+    found = []
+    for first in range(0, len(matrix), BLOCK):
+        rows = slice(first, first + BLOCK)
+        low, high = min(lows[rows]), matrix.shape[1] - min(behind[rows])
+        found.append((matrix[rows, low:high].contiguous(), low, high))
+    return tuple(found)
+
+
+class _Blur(torch.autograd.Function):
+    """A Gaussian blur by two banded matrices, one for each axis."""
+
+    @staticmethod
+    def forward(ctx: Any, image: torch.Tensor, variance: torch.Tensor, canvas: _Canvas) -> torch.Tensor:
+        down, across = ctx.bands = canvas.bands(float(variance))
+        made: torch.Tensor = (across @ (down @ image).mT).mT
+        ctx.save_for_backward(made)
+        return made
+
+    @staticmethod
+    @once_differentiable
+    def backward(ctx: Any, cotangent: torch.Tensor) -> tuple[torch.Tensor | None, ...]:
+        (made,) = ctx.saved_tensors
+        down, across = (band.transposed for band in ctx.bands)
+        image = down @ (across @ cotangent.mT).mT
+        # what is blurred obeys the heat equation: by the variance it changes by half its Laplacian
+        variance = 0.5 * (cotangent * _laplacian(made)).sum() if ctx.needs_input_grad[1] else None
+        return image, variance, None
+
+
+def _laplacian(image: torch.Tensor) -> torch.Tensor:
+    """Of an image [C, H, W], as if it went on at its edges as it ends there."""
+    padded = torch.nn.functional.pad(image[None], (1, 1, 1, 1), mode="replicate")[0]
+    beside = padded[:, 1:-1, 2:] + padded[:, 1:-1, :-2] + padded[:, 2:, 1:-1] + padded[:, :-2, 1:-1]
+    return beside - 4.0 * image
