@@ -6,7 +6,7 @@ import math
 from bisect import bisect_left
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import AbstractContextManager, nullcontext
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from functools import cache, cached_property, partial
 from typing import TYPE_CHECKING
 
@@ -52,6 +52,7 @@ _settled: Callable[[Scene, StepsOf, Views], Scene] = deferred("sdf2vec.fit.settl
 _views_of: Callable[[Picture], Views] = deferred("sdf2vec.fit.settling", "views_of")
 _picture_of: Callable[[Scene], Picture] = deferred("sdf2vec.fit.conversion", "picture_of")
 _psnr_of: Callable[[Scene, Picture], float] = deferred("sdf2vec.quality", "psnr_of")
+_psnr_of_drawable: Callable[[Drawable, Picture], float] = deferred("sdf2vec.quality", "psnr_of_drawable")
 _over_of: Callable[[Scene], tuple[Scene, float]] = deferred("sdf2vec.fit.conversion", "over_of")
 
 
@@ -327,16 +328,33 @@ def _lost(decibels: float) -> str:
     return f"{decibels:.2f} dB of the picture lost" if decibels >= 0.005 else "nothing of the picture lost"
 
 
-def share_of_limit(targets: Sequence[str], options: Options) -> Callable[[Scene], float]:
-    """How much of the size limit the largest of some exports of a scene takes, each in a small form; a little more, as
+@dataclass(frozen=True)
+class Share:
+    """How much of a size limit the largest of some exports of a scene takes, each in a small form; a little more, as
     its numbers are still to be fitted.
     """
-    limit = ByteLimit.of(options.max_bytes or "")
+
+    targets: tuple[str, ...]
+    options: Options
+
+    def __call__(self, scene: Scene) -> float:
+        exports, limit = Exports(scene), ByteLimit.of(self.options.max_bytes or "")
+        sizes = [limit.share(exports.densest(target, self.options).raw) for target in self.targets]
+        return max(sizes) / SURE
+
+    def near(self, scene: Scene, picture: Picture) -> float:
+        """How near the least near of these forms comes to a picture, about, in dB."""
+        drawing = any(
+            EXPORTERS[target].draw and EXPORTERS[target].draws(scene, self.options) for target in self.targets
+        )
+        if not drawing:
+            return _psnr_of(scene, picture)
+        return _psnr_of_drawable(Exports(scene, picture).drawn(DENSE), picture)
+
+
+def share_of_limit(targets: Sequence[str], options: Options) -> Share:
+    """That of these targets. Raises Sdf2vecError for an unknown one, or for what is no limit."""
+    ByteLimit.of(options.max_bytes or "")
     for target in targets:
         check_choice("target", target, EXPORTERS)
-
-    def share(scene: Scene) -> float:
-        exports = Exports(scene)
-        return max(limit.share(exports.densest(target, options).raw) for target in targets) / SURE
-
-    return share
+    return Share(tuple(targets), options)

@@ -9,10 +9,14 @@ import torch
 
 from .fit.views import scaled
 from .flip import flip
+from .grain import Drawable
 from .image import Picture
 from .metrics import psnr
 from .render.draw import draw_fast
+from .render.runs import Runs
+from .render.tensors import from_scene
 from .scene import Scene
+from .threads import threads_of_its_own
 
 FLIP_RESOLUTION = 1000  # FLIP takes long: pictures of more pixels than the square are scaled down for it
 
@@ -39,6 +43,20 @@ def quality(scene: Scene, picture: Picture) -> Quality:
 def psnr_of(scene: Scene, picture: Picture) -> float:
     """PSNR alone, in dB: FLIP takes long."""
     return float(psnr(*_drawn_and_target(scene, picture)))
+
+
+def psnr_of_drawable(drawable: Drawable, picture: Picture) -> float:
+    """PSNR of what a small drawing shows."""
+    if not drawable.runs:
+        return psnr_of(drawable.scene, picture)
+    pixels = picture.premultiplied
+    counts, deviations = zip(*drawable.runs, strict=True)
+    tensors, size = from_scene(drawable.scene), (picture.width, picture.height)
+    with torch.no_grad(), threads_of_its_own():
+        drawn = Runs(counts, torch.tensor(deviations)).composite(tensors, *size, pixels.shape[2])
+    return float(
+        psnr(drawn.clamp(0.0, 1.0), torch.from_numpy(np.ascontiguousarray(pixels.transpose(2, 0, 1))))
+    )
 
 
 def _drawn_and_target(scene: Scene, picture: Picture) -> tuple[torch.Tensor, torch.Tensor]:

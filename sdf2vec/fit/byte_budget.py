@@ -21,7 +21,9 @@ from .surroundings import View
 from .thinning import lighter
 from .views import view_of
 
-Share = Callable[[Scene], float]  # of a size limit, above 1 for what is too large
+# Of a size limit, above 1 for what is too large. What also has `near(scene, picture)` says by that how near what is
+# written then comes to a picture, in dB, if that is not what the scene's render does.
+Share = Callable[[Scene], float]
 PROBED = 16, 64  # shapes of each sort that are tried first: as many as may be needed, or a quarter of them
 ENOUGH = 0.945  # of the limit, that is to be used
 FITS = 3  # of full length, at most
@@ -58,7 +60,8 @@ def within(picture: Picture, settings: Settings, share: Share, callback: Callbac
             taken = share(scene)
             each = (taken - empty) / count
             scene, taken = _trimmed(scene, view, share, each, taken)
-            if (now := psnr_of(scene, picture)) > near:
+            now = _near(share, scene, picture) if chancy else psnr_of(scene, picture)
+            if now > near:
                 best, near = (scene, taken), now
             more = min(math.floor((1.0 - empty) / each), settings.most)
             is_full = taken >= ENOUGH or more <= count
@@ -66,6 +69,12 @@ def within(picture: Picture, settings: Settings, share: Share, callback: Callbac
                 break
             count = count if is_full else more
     return best
+
+
+def _near(share: Share, scene: Scene, picture: Picture) -> float:
+    """How near a scene comes to a picture as it is written, in dB."""
+    found: float = getattr(share, "near", psnr_of)(scene, picture)
+    return found
 
 
 def _nothing(picture: Picture, settings: Settings, view: View) -> Scene:
@@ -76,8 +85,10 @@ def _nothing(picture: Picture, settings: Settings, view: View) -> Scene:
 
 
 def _sorts(settings: Settings) -> Iterator[Settings]:
-    """Shapes as they are, and circles, which a shader says in few words; whatever the user has left open."""
-    yield settings
+    """Soft and sharp shapes, and circles, which a shader says in few words; whatever the user has left open."""
+    edges = [None, 0.0] if settings.max_falloff is None else [settings.max_falloff]
+    for edge in edges:
+        yield structs.replace(settings, max_falloff=edge)
     if not settings.kind:
         yield structs.replace(settings, kind=("circle",))
 
@@ -99,7 +110,7 @@ def _probe(settings: Settings, picture: Picture, share: Share, callback: Callbac
     least, most = share(replace(few, layers=few.layers[:1])), share(few)
     each = max((most - least) / max(count - 1, 1), 1e-9)
     wanted = 1 + math.floor((1.0 - least) / each) if least <= 1.0 else 0
-    hoped = psnr_of(few, picture) + SLOPE * math.log2(max(wanted, 1e-3) / count)
+    hoped = _near(share, few, picture) + SLOPE * math.log2(max(wanted, 1e-3) / count)
     return Probe(settings, min(max(wanted, 1), settings.most), hoped)
 
 
