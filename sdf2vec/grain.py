@@ -44,11 +44,12 @@ GRAINS = (  # finest first
     Grain(4096, 20, 255, 100, 0.8, fewest=20),
     Grain(1024, 12, 255, 100, 0.8, fewest=5),
     Grain(512, 12, 255, 20, 0.6, fewest=5),
+    Grain(256, 8, 51, 10),
     Grain(256, 0, 51, 10, runs=3),
     Grain(200, 0, 25, 10, runs=3),
     Grain(160, 0, 15, 10, runs=3),
 )
-DENSE = GRAINS[3]  # more shapes of it say more of a picture than fewer finer ones, or yet more coarser ones
+DENSE = GRAINS[4]  # more shapes of it say more of a picture than fewer finer ones, or yet more coarser ones
 USUAL = GRAINS[2::-1]  # what is tried where no size is asked for, smallest first
 
 
