@@ -47,6 +47,7 @@ Phase = Callable[[str], AbstractContextManager[object]]
 _drawable: Callable[[Scene, Views, Grain, Scene | None], Drawable] = deferred(
     "sdf2vec.fit.drawable", "drawable"
 )
+_blurred: Callable[[Scene, Views, Grain], Drawable] = deferred("sdf2vec.fit.drawable", "blurred")
 _rounded: Callable[[Scene, Grain], Drawable] = deferred("sdf2vec.fit.drawable", "rounded")
 _settled: Callable[[Scene, StepsOf, Views], Scene] = deferred("sdf2vec.fit.settling", "settled")
 _views_of: Callable[[Picture], Views] = deferred("sdf2vec.fit.settling", "views_of")
@@ -343,13 +344,13 @@ class Share:
         return max(sizes) / SURE
 
     def near(self, scene: Scene, picture: Picture) -> float:
-        """How near the least near of these forms comes to a picture, about, in dB."""
+        """How near these forms come to a picture, about, in dB: before their numbers are such as are written."""
         drawing = any(
             EXPORTERS[target].draw and EXPORTERS[target].draws(scene, self.options) for target in self.targets
         )
         if not drawing:
             return _psnr_of(scene, picture)
-        return _psnr_of_drawable(Exports(scene, picture).drawn(DENSE), picture)
+        return _psnr_of_drawable(_blurred(scene, _views_of(picture), DENSE), picture)
 
 
 def share_of_limit(targets: Sequence[str], options: Options) -> Share:

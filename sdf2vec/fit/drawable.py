@@ -60,14 +60,27 @@ def drawable(scene: Scene, views: Views, grain: Grain, coarser: Scene | None = N
     softening, settling = _begun(tensors, scene, grain)
     phases: Sequence[Phase] = GOING_ON if coarser else PHASES
     if softening:
-        sides = FINE if softening.sharpest < FINER else COARSE
-        blurring, *phases = (
-            replace(phase, resolution=side) for phase, side in zip(BLURRED, sides, strict=True)
-        )
-        descend(tensors, (), views, scene, frozen=(FALLOFF.name,), phases=(blurring,), softening=softening)
-        softening.settle()
+        phases = _blur(tensors, softening, views, scene)
     descend(tensors, settling, views, scene, frozen=(FALLOFF.name,), phases=phases, softening=softening)
     return _ended(tensors, scene, softening)
+
+
+def blurred(scene: Scene, views: Views, grain: Grain) -> Drawable:
+    """The scene in the runs of a grain, as near to a picture as it comes, before its numbers are rounded."""
+    tensors = from_scene(scene)
+    softening, _ = _begun(tensors, scene, grain)
+    if softening:
+        _blur(tensors, softening, views, scene)
+    return _ended(tensors, scene, softening)
+
+
+def _blur(tensors: SceneTensors, softening: Softening, views: Views, scene: Scene) -> list[Phase]:
+    """Descends in runs until they have the blurs that they keep; the phases that are left."""
+    sides = FINE if softening.sharpest < FINER else COARSE
+    first, *rest = (replace(phase, resolution=side) for phase, side in zip(BLURRED, sides, strict=True))
+    descend(tensors, (), views, scene, frozen=(FALLOFF.name,), phases=(first,), softening=softening)
+    softening.settle()
+    return rest
 
 
 def _begun(tensors: SceneTensors, scene: Scene, grain: Grain) -> tuple[Softening | None, list[Settling]]:
