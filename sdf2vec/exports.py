@@ -199,6 +199,7 @@ class Exports:
             return limit.share(exporter.sketch(_rounded(scene, grain), options, grain).raw)
 
         def may_fit(grain: Grain) -> bool:
+            # runs are fitted anew each, which takes long: none that may turn out too large
             return share_of(grain) <= (1.0 if grain.runs else ABOUT)
 
         near = self._near_enough(exporter, scene, options) if may_fit(USUAL[0]) else None
@@ -337,25 +338,23 @@ class Share:
 
     targets: tuple[str, ...]
     options: Options
+    limit: ByteLimit
 
     def __call__(self, scene: Scene) -> float:
-        exports, limit = Exports(scene), ByteLimit.of(self.options.max_bytes or "")
-        sizes = [limit.share(exports.densest(target, self.options).raw) for target in self.targets]
+        exports = Exports(scene)
+        sizes = [self.limit.share(exports.densest(target, self.options).raw) for target in self.targets]
         return max(sizes) / SURE
 
     def near(self, scene: Scene, picture: Picture) -> float:
         """How near these forms come to a picture, about, in dB: before their numbers are such as are written."""
-        drawing = any(
-            EXPORTERS[target].draw and EXPORTERS[target].draws(scene, self.options) for target in self.targets
-        )
-        if not drawing:
-            return _psnr_of(scene, picture)
-        return _psnr_of_drawable(_blurred(scene, _views_of(picture), DENSE), picture)
+        if any(EXPORTERS[target].draws(scene, self.options) for target in self.targets):
+            return _psnr_of_drawable(_blurred(scene, _views_of(picture), DENSE), picture)
+        return _psnr_of(scene, picture)
 
 
 def share_of_limit(targets: Sequence[str], options: Options) -> Share:
     """That of these targets. Raises Sdf2vecError for an unknown one, or for what is no limit."""
-    ByteLimit.of(options.max_bytes or "")
+    limit = ByteLimit.of(options.max_bytes or "")
     for target in targets:
         check_choice("target", target, EXPORTERS)
-    return Share(tuple(targets), options)
+    return Share(tuple(targets), options, limit)

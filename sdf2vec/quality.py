@@ -49,18 +49,20 @@ def psnr_of_drawable(drawable: Drawable, picture: Picture) -> float:
     """PSNR of what a small drawing shows."""
     if not drawable.runs:
         return psnr_of(drawable.scene, picture)
-    pixels = picture.premultiplied
+    target = _target(picture)
     counts, deviations = zip(*drawable.runs, strict=True)
-    tensors, size = from_scene(drawable.scene), (picture.width, picture.height)
+    runs, tensors = Runs(counts, torch.tensor(deviations)), from_scene(drawable.scene)
     with torch.no_grad(), threads_of_its_own():
-        drawn = Runs(counts, torch.tensor(deviations)).composite(tensors, *size, pixels.shape[2])
-    return float(
-        psnr(drawn.clamp(0.0, 1.0), torch.from_numpy(np.ascontiguousarray(pixels.transpose(2, 0, 1))))
-    )
+        drawn = runs.composite(tensors, picture.width, picture.height, len(target))
+    return float(psnr(drawn.clamp(0.0, 1.0), target))
 
 
 def _drawn_and_target(scene: Scene, picture: Picture) -> tuple[torch.Tensor, torch.Tensor]:
     """The render and the picture, premultiplied, [C, H, W]."""
-    pixels = picture.premultiplied
-    drawn = draw_fast(scene, picture.width, picture.height)[: pixels.shape[2]]
-    return drawn, torch.from_numpy(np.ascontiguousarray(pixels.transpose(2, 0, 1)))
+    target = _target(picture)
+    return draw_fast(scene, picture.width, picture.height)[: len(target)], target
+
+
+def _target(picture: Picture) -> torch.Tensor:
+    """The picture, premultiplied, [C, H, W]."""
+    return torch.from_numpy(np.ascontiguousarray(picture.premultiplied.transpose(2, 0, 1)))

@@ -33,8 +33,8 @@ BLURRED = (  # of layers that are blurred in runs, no longer each by its falloff
     Phase("settling", 130, 256, rate=0.3, end_rate=0.15, loss=MSE),
     Phase("settling", 80, 320, rate=0.15, end_rate=0.04, loss=MSE),
 )
-COARSE, FINE = (256, 256, 320), (256, 320, 384)  # pixels squared, of these phases
-FINER = 1.3  # pixels: a run of a smaller standard deviation needs the finer ones
+FINE = (256, 320, 384)  # pixels squared, of these phases, where a run needs them
+FINER = 1.3  # pixels: one of a smaller standard deviation does
 GROWTH = 1.1  # of a triangle's spread, where its edge moves outwards
 GROWING = ("radius", "radii", "half_size", "corner_radius")  # what a shape is larger by; others have corners
 TINY = 1e-12
@@ -76,8 +76,9 @@ def blurred(scene: Scene, views: Views, grain: Grain) -> Drawable:
 
 def _blur(tensors: SceneTensors, softening: Softening, views: Views, scene: Scene) -> list[Phase]:
     """Descends in runs until they have the blurs that they keep; the phases that are left."""
-    sides = FINE if softening.sharpest < FINER else COARSE
-    first, *rest = (replace(phase, resolution=side) for phase, side in zip(BLURRED, sides, strict=True))
+    first, *rest = BLURRED
+    if softening.sharpest < FINER:
+        first, *rest = (replace(phase, resolution=side) for phase, side in zip(BLURRED, FINE, strict=True))
     descend(tensors, (), views, scene, frozen=(FALLOFF.name,), phases=(first,), softening=softening)
     softening.settle()
     return rest

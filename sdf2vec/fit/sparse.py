@@ -173,7 +173,7 @@ def without(scene: SceneTensors, order: int) -> SceneTensors:
     return replace(fewer, groups=groups)
 
 
-def _without_all(scene: SceneTensors, orders: list[int]) -> SceneTensors:
+def without_all(scene: SceneTensors, orders: list[int]) -> SceneTensors:
     """The scene without the layers at these places of the draw order, which rise."""
     for order in reversed(orders):
         scene = without(scene, order)
@@ -246,7 +246,7 @@ def _rethought(scene: SceneTensors, sizes: Sizes, search: Search, floor: float) 
     if not 1 < scene.layer_count <= FEW or error <= floor:
         return scene
     for orders in _alike(scene, sizes.search)[:RETHOUGHT]:
-        opened = _opened(_without_all(scene, orders), orders[0])
+        opened = _opened(without_all(scene, orders), orders[0])
         color = layer_at(scene, orders[0]).of(BASE.name, 0)
         around = Surroundings.of(opened, orders[0], sizes.search)
         other = instead_of(orders[0], color, around, search, floor)
@@ -368,7 +368,7 @@ def _bare(
     for order in areas.argsort(descending=True).tolist():
         smaller = (touching[order] & (areas < areas[order])).nonzero()[:, 0].tolist()
         if len(smaller) > 1:
-            fewer, error = _settled(_without_all(scene, smaller), sizes, search, hope)
+            fewer, error = _settled(without_all(scene, smaller), sizes, search, hope)
             if error <= worst:
                 return fewer, error
     return None

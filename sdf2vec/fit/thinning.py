@@ -17,7 +17,7 @@ from .joining import Search
 from .loop import Stopped
 from .presets import Phase
 from .settings import Settings, preset_of
-from .sparse import descended, error_of, without
+from .sparse import descended, error_of, without, without_all
 from .surroundings import View
 from .views import view_of
 
@@ -56,6 +56,4 @@ def lighter(scene: SceneTensors, view: View, count: int) -> SceneTensors:
     """The scene without so many layers: those without one of which it is least wrong."""
     errors = [error_of(without(scene, order), view) for order in range(scene.layer_count)]
     least = sorted(range(len(errors)), key=errors.__getitem__)[:count]
-    for order in sorted(least, reverse=True):
-        scene = without(scene, order)
-    return scene
+    return without_all(scene, sorted(least))

@@ -7,14 +7,14 @@ opacities, which have few steps. The smallest blur whole runs of layers by one f
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 from itertools import islice
 
 import numpy as np
 
 from ...blend import EDGE_DEVIATION
-from ...grain import Drawable, Grain
+from ...grain import Drawable, Grain, Run
 from ...outlines import EllipseOutline, Outline, PolygonOutline
 from ...scene import Layer, Scene
 from .blur import best_traced, trial_of
@@ -37,51 +37,38 @@ def drawn(drawable: Drawable, grain: Grain) -> tuple[Drawing, float]:
     """What a drawing of this grain can say, as a display list, and how far that is off from the scene's render, in
     8-bit levels (root mean square), about; 0 for runs, which are as they were fitted.
     """
-    scene = drawable.scene
-    canvas = Canvas.whole(scene, grain.units)
     if drawable.runs:
         return sketched(drawable, grain), 0.0
-    samples = layers_at(scene)
+    scene = drawable.scene
+    canvas, samples = Canvas.whole(scene, grain.units), layers_at(scene)
     made = [_blurred(layer, canvas) for layer in scene.layers]
     geometries = [geometry for geometry, _ in made]
     off = {index: difference for index, (_, difference) in enumerate(made) if difference is not None}
     again, error = refitted(scene, samples, off, (), grain.colors, grain.opacities, HASTY)
     error += _mixed(scene, samples, canvas) + _moved(scene, samples, geometries, canvas)
-    return _drawing(canvas, scene, _figures(again, geometries, canvas)), 255.0 * math.sqrt(error)
+    return _drawing(again, geometries, canvas), 255.0 * math.sqrt(error)
 
 
 def sketched(drawable: Drawable, grain: Grain) -> Drawing:
     """The same without all that makes up for what blurs do: of about as many bytes."""
     scene = drawable.scene
     canvas = Canvas.whole(scene, grain.units)
-    figures = _figures(scene, [_edge(layer, canvas) for layer in scene.layers], canvas)
-    if not drawable.runs:
-        return _drawing(canvas, scene, figures)
-    rest, items = iter(figures), list[Item]()
-    for count, deviation in drawable.runs:
-        run = [figure for figure in islice(rest, count) if figure]
+    return _drawing(scene, [_edge(layer, canvas) for layer in scene.layers], canvas, drawable.runs)
+
+
+def _drawing(
+    scene: Scene, geometries: Sequence[Geometry], canvas: Canvas, runs: Sequence[Run] = ()
+) -> Drawing:
+    layers, items = zip(scene.layers, geometries, strict=True), list[Item]()
+    for count, deviation in runs or (Run(len(geometries), 0.0),):
+        run = [_figure(*layer, canvas) for layer in islice(layers, count) if layer[1] != NOWHERE]
         items += [Group(tuple(run), blur=deviation * canvas.unit)] if deviation and run else run
-    return _drawing(canvas, scene, items)
+    return Drawing(canvas.width, canvas.height, canvas.pixels, canvas.digits, scene.background, tuple(items))
 
 
-def _drawing(canvas: Canvas, scene: Scene, items: Iterable[Item | None]) -> Drawing:
-    seen = tuple(item for item in items if item)
-    return Drawing(canvas.width, canvas.height, canvas.pixels, canvas.digits, scene.background, seen)
-
-
-def _figures(scene: Scene, geometries: Sequence[Geometry], canvas: Canvas) -> list[Figure | None]:
-    """One for each layer, none for what is nowhere."""
-    return [
-        None
-        if geometry == NOWHERE
-        else Figure(
-            _rounded(geometry, canvas),
-            fill_of(layer, canvas).fill,
-            layer.opacity,
-            _deviation(layer) * canvas.unit,
-        )
-        for layer, geometry in zip(scene.layers, geometries, strict=True)
-    ]
+def _figure(layer: Layer, geometry: Geometry, canvas: Canvas) -> Figure:
+    fill = fill_of(layer, canvas).fill
+    return Figure(_rounded(geometry, canvas), fill, layer.opacity, _deviation(layer) * canvas.unit)
 
 
 def _deviation(layer: Layer) -> float:
