@@ -92,3 +92,18 @@ def test_in_a_photograph_no_drawing_is_looked_for(monkeypatch):
     assert not auto.is_photograph(drawing)
     monkeypatch.setattr(auto, "_few", lambda *given: pytest.fail("looked for a drawing"))
     fitted(picture, preset="fast", kind="circle", max_falloff=0.0, share=by_count(5))
+
+
+@pytest.mark.parametrize("is_wanted", [True, False])
+def test_a_share_may_say_how_near_what_is_written_comes(is_wanted):
+    """Which of soft and sharp shapes are taken, whatever their renders are."""
+
+    class Share:
+        def __call__(self, scene):
+            return scene.shape_count / 6
+
+        def near(self, scene, picture):
+            return 20.0 if any(layer.falloff for layer in scene.layers) == is_wanted else 10.0
+
+    found = fitted(noise(), preset="fast", kind="triangle", share=Share())
+    assert any(layer.falloff for layer in found.scene.layers) == is_wanted

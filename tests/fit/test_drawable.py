@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from sdf2vec import Layer, Scene, Shape, fit
+from sdf2vec.blend import EDGE_DEVIATION
 from sdf2vec.fit.drawable import drawable, rounded, softnesses
 from sdf2vec.fit.settling import views_of
 from sdf2vec.grain import DENSE, GRAINS, USUAL, Grain, is_drawable
@@ -88,6 +89,16 @@ def test_triangles_without_an_area_are_unfolded():
     assert np.ptp(corners[0][:, 1]) == pytest.approx(1 / 64, abs=1e-5)
     assert abs(sharp_ab[0] * sharp_ac[1] - sharp_ab[1] * sharp_ac[0]) > 1e-4
     assert abs(soft_ab[0] * soft_ac[1] - soft_ab[1] * soft_ac[0]) < 1e-6
+
+
+def test_in_a_run_edges_stay_where_coverage_is_one_half():
+    """Sharp, a shape is larger by half of its falloff."""
+    disc = Shape.of("circle", (1, 0, 0), center=(0, 0), radius=0.2)
+    found = rounded(Scene(64, 64, (Layer((disc,), 0.1),)), DENSE)
+    (layer,) = found.scene.layers
+    assert layer.falloff == 0.0
+    assert layer.shapes[0].named()["radius"] == pytest.approx(0.25, abs=0.51 / DENSE.units)
+    assert found.runs[0].deviation == pytest.approx(0.1 * EDGE_DEVIATION)
 
 
 def test_what_can_not_be_drawn_small():

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 import torch
 from scipy.ndimage import gaussian_filter
+from scipy.stats import norm
 
 from sdf2vec import Layer, Scene, Shape
 from sdf2vec.render.reference import render
@@ -62,6 +63,23 @@ def test_what_is_beyond_the_edge_is_blurred_into_the_picture():
     scene = Scene(64, 64, (Layer((box,), 0.0),), (0, 0, 0))  # its edge is the canvas'
     found = Runs((1,), torch.tensor([4 / 64])).composite(from_scene(scene), 64, 64, 3)
     assert found[:, 32, 0] == pytest.approx(0.45, abs=0.02)  # half a pixel from the middle of a soft edge
+
+
+@pytest.mark.parametrize(("pixels", "step"), [(1.2, 1), (7.0, 4), (20.0, 13)])
+def test_an_edge_is_as_wide_as_asked_for(pixels, step):
+    """The normal distribution's, of the blur and a square pixel together, in the mean of where the edge lies between
+    samples, which are so many pixels wide: a lone one is off by up to a tenth of a sample, as antialiasing is.
+    """
+    at, off = np.arange(240) + 0.5 - 120, []
+    for moved in (np.arange(16) + 0.5) / 16 * step:
+        box = Shape.of(
+            "box", (1, 1, 1), center=(moved / 60 - 2, 0), half_size=(2, 9), angle=0, corner_radius=0
+        )
+        scene = Scene(240, 60, (Layer((box,), 0.0),), (0, 0, 0))
+        found = Runs((1,), torch.tensor([pixels / 60])).composite(from_scene(scene), 240, 60, 3)[0, 30]
+        wrong = found.numpy() - norm.cdf((moved - at) / np.sqrt(pixels**2 + 1 / 12))
+        off.append(255 * np.interp(at, at - moved, wrong))
+    assert np.abs(np.mean(off, axis=0)).max() < 0.4
 
 
 @pytest.mark.parametrize("deviation", [0.03, 0.08])
