@@ -68,6 +68,7 @@ def html(scene: Scene, options: Options) -> Exported:
             name: label for name, label in LABELS.items() if name in served or (name == "svg" and drawing)
         },
         texts=_in_lines(texts.texts),
+        tabled=texts.tabled,
         file=base64.b64encode(file).decode(),
         places="\n".join(texts.functions),
         policy=POLICY,

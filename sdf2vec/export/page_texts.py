@@ -1,5 +1,5 @@
-"""The readable shaders of a page, which are made there from its one scene: what is around the layers, and for each sort
-of layer its lines with places for numbers.
+"""The shaders of a page, which are made there from its one scene. Of a readable one: what is around the layers, and for
+each sort of layer its lines with places for numbers. Of one that would be long, in a table: what is around its rows.
 
 Lines and the numbers in them come from the exporter itself: it writes a layer of numbers that are like no others, and
 where they, or what follows from them alone, stand in the text, there are places. A layer of which it says something
@@ -23,10 +23,10 @@ from ..lower.javascript import function_text
 from ..lower.shader import literal
 from ..operation import FLOAT
 from ..scene import Layer, Scene
-from .layouts import TEXT_LIMIT
+from .layouts import TEXT_LIMIT, fits_constants
 from .options import Options
 from .records import BELOW, first_records
-from .shader import MOST_READABLE, shader, statements_of, statements_text
+from .shader import MOST_READABLE, TARGETS, shader, statements_of, statements_text, table_rows
 
 NUMBER = re.compile(r"(?<![\w.])\d+\.\d+(?:e[-+]?\d+)?|\b50021\b")
 FIRST = 50021  # the number of a shape that no text has
@@ -112,20 +112,33 @@ class PageTexts:
 
     @classmethod
     def of(cls, scene: Scene, names: Iterable[str], options: Options) -> PageTexts:
-        """What is too long to be readable is as the exporter writes it."""
+        """What is too long to be readable, or for a table, is as the exporter writes it."""
         sorts = {
             s: Sort(s, scene.compositing) for s in dict.fromkeys(layer.structure for layer in scene.layers)
         }
         texts = {name: _text(scene, name, options, sorts) for name in names}
         return cls(texts, [sort.function for sort in sorts.values() if sort.used])
 
+    @property
+    def tabled(self) -> bool:
+        """Whether any is in a table."""
+        return any("rows" in text for text in self.texts.values() if isinstance(text, dict))
+
 
 def _text(scene: Scene, name: str, options: Options, sorts: Mapping[Structure, Sort]) -> Any:
     readable = structs.replace(options, layout="readable")
+    if "table" not in TARGETS[name].host.layouts:
+        return _in_lines(scene, name, readable, shader(scene, name, options).text, sorts)
     text = shader(scene, name, readable).text if scene.shape_count <= MOST_READABLE else ""
-    if not text or len(text.encode()) > TEXT_LIMIT:
-        return shader(scene, name, options).text
-    said = [statements_text([one]) for one in statements_of(scene, name, readable)]
+    if text and len(text.encode()) <= TEXT_LIMIT:
+        return _in_lines(scene, name, readable, text, sorts)
+    if fits_constants(scene):
+        return _in_table(scene, name, structs.replace(options, layout="table"))
+    return shader(scene, name, options).text
+
+
+def _in_lines(scene: Scene, name: str, options: Options, text: str, sorts: Mapping[Structure, Sort]) -> Any:
+    said = [statements_text([one]) for one in statements_of(scene, name, options)]
     if not said:
         return text
     head, tail = text.split("".join(said))
@@ -141,6 +154,17 @@ def _text(scene: Scene, name: str, options: Options, sorts: Mapping[Structure, S
         if sort.key not in lines or filled(lines[sort.key], first, sort.values(layer)) != text:
             odd[index] = text
     return {"around": [head, tail], "lines": lines, "odd": odd}
+
+
+def _in_table(scene: Scene, name: str, options: Options) -> dict[str, list[str]]:
+    """What is around the rows of each of its tables."""
+    text = shader(scene, name, options).text
+    around = []
+    for rows in table_rows(scene):
+        before, found, text = text.partition(",\n".join(rows))
+        assert found, "a table is written in lines"
+        around.append(before)
+    return {"rows": [*around, text]}
 
 
 def _lines(scene: Scene, name: str, options: Options, sort: Sort) -> str:

@@ -366,8 +366,7 @@ def _layer(layer: Layer, first: int, job: _Job) -> Expr:
 
 def _table(job: _Job) -> dict[str, Any]:
     form = form_of(job.scene)
-    rows = records(job.scene, form)
-    return _loop(job, form) | {"table": _table_part(job, form) | {"rows": _rows(rows)}}
+    return _loop(job, form) | {"table": _table_part(job, form) | {"rows": table_rows(job.scene)}}
 
 
 def _tiled(job: _Job) -> dict[str, Any]:
@@ -460,8 +459,9 @@ def _grid_part(job: _Job, tiles: Tiles) -> dict[str, Any]:
     }
 
 
-def _rows(table: Float32Array) -> list[list[str]]:
-    """The text of each vec4 of the records, [stride][shapes]."""
+def table_rows(scene: Scene) -> list[list[str]]:
+    """The text of each vec4 of its records, [stride][shapes]."""
+    table = records(scene, form_of(scene))
     return [[_vec4(row) for row in rows.tolist()] for rows in table.swapaxes(0, 1)]
 
 

@@ -120,11 +120,11 @@ def test_buttons_copy_the_texts(opened):
             page.evaluate("document.querySelector('[role=status]').textContent = ''")
 
 
-def _text(name, scene=SCENE):
+def _text(name, scene=SCENE, layout="readable"):
     """What the exporter writes of the scene that the page holds; of a drawing, which it has as it is, of the scene."""
     if name == "svg":
         return sdf2vec.export(scene, name, title=TITLE)
-    return sdf2vec.export(held(scene), name, title=TITLE, alone=True, layout="readable")
+    return sdf2vec.export(held(scene), name, title=TITLE, alone=True, layout=layout)
 
 
 def held(scene):
@@ -211,8 +211,26 @@ def texts_in(page):
     return json.loads(texts, strict=False)  # its line breaks are as they are
 
 
-def test_a_text_too_long_to_be_readable_is_as_exported(monkeypatch):
+def test_a_text_too_long_to_be_readable_is_in_a_table(opened, monkeypatch):
+    """Of all kinds, paints and joins; a host without tables has it readable."""
     monkeypatch.setattr(page_texts, "TEXT_LIMIT", 1000)
+    scene = random_scene(layers=8, seed=6, width=30, height=20)
+    scene = replace(
+        scene,
+        layers=(*scene.layers, Layer((Shape.of("circle", (1, 0, 0), center=(0, -1e-7), radius=2),), 0.0)),
+    )
+    with opened(page_of(scene), 300, 300) as page:
+        page.evaluate(RECORD_COPIES)
+        for name, layout in (("shadertoy", "table"), ("glsl", "table"), ("wgsl", "readable")):
+            page.locator(f'[data-text="{name}"]').click()
+            chromium.wait_until(page, "window.copied")
+            assert page.evaluate("window.copied") == _text(name, scene, layout)
+            page.evaluate("window.copied = ''")
+
+
+def test_a_text_too_long_for_a_table_is_as_exported(monkeypatch):
+    monkeypatch.setattr(page_texts, "TEXT_LIMIT", 1000)
+    monkeypatch.setattr(page_texts, "fits_constants", lambda scene: False)
     assert texts_in(page_of(SCENE))["shadertoy"] == sdf2vec.export(
         held(SCENE), "shadertoy", title=TITLE, alone=True
     )
