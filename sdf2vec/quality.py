@@ -4,10 +4,9 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-import numpy as np
 import torch
 
-from .fit.views import scaled
+from .fit.views import planes, scaled
 from .flip import flip
 from .grain import Drawable
 from .image import Picture
@@ -35,7 +34,7 @@ def quality(scene: Scene, picture: Picture) -> Quality:
     FLIP is that of both scaled down to about a million pixels, where they have more.
     """
     drawn, target = _drawn_and_target(scene, picture)
-    small = [scaled(planes.permute(1, 2, 0).numpy(), FLIP_RESOLUTION) for planes in (drawn, target)]
+    small = [scaled(image.permute(1, 2, 0).numpy(), FLIP_RESOLUTION) for image in (drawn, target)]
     height, width = small[0].shape[1:]
     return Quality(float(psnr(drawn, target)), float(flip(*small)), (width, height))
 
@@ -49,7 +48,7 @@ def psnr_of_drawable(drawable: Drawable, picture: Picture) -> float:
     """PSNR of what a small drawing shows."""
     if not drawable.runs:
         return psnr_of(drawable.scene, picture)
-    target = _target(picture)
+    target = planes(picture.premultiplied)
     counts, deviations = zip(*drawable.runs, strict=True)
     runs, tensors = Runs(counts, torch.tensor(deviations)), from_scene(drawable.scene)
     with torch.no_grad(), threads_of_its_own():
@@ -59,10 +58,5 @@ def psnr_of_drawable(drawable: Drawable, picture: Picture) -> float:
 
 def _drawn_and_target(scene: Scene, picture: Picture) -> tuple[torch.Tensor, torch.Tensor]:
     """The render and the picture, premultiplied, [C, H, W]."""
-    target = _target(picture)
+    target = planes(picture.premultiplied)
     return draw_fast(scene, picture.width, picture.height)[: len(target)], target
-
-
-def _target(picture: Picture) -> torch.Tensor:
-    """The picture, premultiplied, [C, H, W]."""
-    return torch.from_numpy(np.ascontiguousarray(picture.premultiplied.transpose(2, 0, 1)))

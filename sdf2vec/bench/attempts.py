@@ -20,6 +20,7 @@ from ..expr import var
 from ..fit.constraints import thicknesses_of
 from ..fit.losses import LOSSES
 from ..fit.presets import PRESETS
+from ..fit.views import planes
 from ..flip import flip
 from ..graph import components_of
 from ..lower.torch import compile_torch
@@ -51,11 +52,6 @@ Attempt = Callable[[int], Outcome]  # of a seed
 # --- judges -------------------------------------------------------------------------------------------------
 
 
-def target_of(pixels: Float32Array) -> torch.Tensor:
-    """[3, H, W]"""
-    return torch.from_numpy(np.ascontiguousarray(pixels.transpose(2, 0, 1)))
-
-
 def gains(image: torch.Tensor, target: torch.Tensor, least: float) -> Outcome:
     """Failed unless an image is so many dB nearer to its target than the best flat ground, and holds no NaN."""
     if not bool(image.isfinite().all()):
@@ -84,7 +80,7 @@ def fitted(make: Callable[[int], Float32Array], shapes: int | str, least: float,
     def attempt(seed: int) -> Outcome:
         pixels = make(seed)
         scene = scene_of(pixels, shapes, seed, **options)
-        return gains(shown(scene), target_of(pixels), least)
+        return gains(shown(scene), planes(pixels), least)
 
     return attempt
 
@@ -105,7 +101,7 @@ def bare_descent(
     """Theirs: shapes anywhere, descended with nothing that guards them, gain so many dB."""
 
     def attempt(seed: int) -> Outcome:
-        target = target_of(make(seed))
+        target = planes(make(seed))
         scene = anywhere(target, kind, shapes, seed, **options)
         return gains(unguarded(scene, target, steps), target, least)
 
@@ -119,7 +115,7 @@ def far_away(seed: int, edge: str) -> Outcome:
     """Small discs on the left, the figure on the right."""
     r = np.random.default_rng(seed)
     rows = [[*r.uniform((-0.4, -0.4), (-0.1, 0.4)), 0.05, 0.9, 0.8, 0.3] for _ in range(3)]
-    target = target_of(pictures.one_disc(seed))
+    target = planes(pictures.one_disc(seed))
     return gains(Discs(edge).descend(torch.tensor(rows), target), target, 3.0)
 
 
@@ -127,7 +123,7 @@ def saturated(seed: int, clamped: bool) -> Outcome:
     """Added discs so bright that a clamped picture is white."""
     r = np.random.default_rng(seed)
     rows = [[*r.uniform(-0.4, 0.4, 2), 0.9, *r.uniform(1.2, 2.0, 3)] for _ in range(6)]
-    target = target_of(pictures.dark_discs(seed))
+    target = planes(pictures.dark_discs(seed))
     return gains(
         Discs(clamped=clamped, added=True).descend(torch.tensor(rows, dtype=torch.float32), target),
         target,
@@ -163,7 +159,7 @@ def from_start(start: Callable[[int], Scene], least: float, guarded: bool) -> At
 
     def attempt(seed: int) -> Outcome:
         pixels, begin = pictures.discs(seed), start(seed)
-        target = target_of(pixels)
+        target = planes(pixels)
         if not guarded:
             return gains(unguarded(from_scene(begin), target, frozen="opacity"), target, least)
         scene = scene_of(pixels, 8, seed, start=begin, kind="circle", preset="balanced")
@@ -174,7 +170,7 @@ def from_start(start: Callable[[int], Scene], least: float, guarded: bool) -> At
 
 def cutter_outside(seed: int) -> Outcome:
     """A disc that is cut by one which lies far outside: no derivative calls it back."""
-    target = target_of(pictures.ring(seed))
+    target = planes(pictures.ring(seed))
     body = Shape.of("circle", (0.2, 0.3, 0.7), center=(0.0, 0.0), radius=0.29)
     cutter = Shape.of("circle", (0.0, 0.0, 0.0), center=(0.75, 0.75), radius=0.1)
     layer = Layer((body, cutter), 0.02, 1.0, joints=(Joint("subtraction", 0.0),))
@@ -260,7 +256,7 @@ def thin(kind: str, guarded: bool) -> Attempt:
 
     def attempt(seed: int) -> Outcome:
         pixels = pictures.noise(seed)
-        target = target_of(pixels)
+        target = planes(pixels)
         if guarded:
             scene = from_scene(scene_of(pixels, 24, seed, kind=kind))
         else:
@@ -290,7 +286,7 @@ def windowed(seed: int) -> Outcome:
 def structured(seed: int) -> Outcome:
     """Ours by SSIM, and judged by it."""
     pixels = pictures.tiny(seed)
-    image, target = shown(scene_of(pixels, 5, seed, loss="ssim", kind="circle")), target_of(pixels)
+    image, target = shown(scene_of(pixels, 5, seed, loss="ssim", kind="circle")), planes(pixels)
     bare = target.mean(dim=(1, 2), keepdim=True).expand_as(target)
     return Outcome(not ssim(image, target) > ssim(bare, target), float(flip(image, target)))
 
@@ -303,7 +299,7 @@ def paced(seed: int, rate: float, preset: str, guarded: bool, worse: float, fits
     many fits to a picture. At the default rates, those of other seeds.
     """
     pixels = pictures.scene_like(seed)
-    target = target_of(pixels)
+    target = planes(pixels)
     others = fits if rate == 1.0 else 0
     usual, found = (
         sum(
@@ -366,5 +362,5 @@ def svg_of_many(seed: int) -> Outcome:
     pixels = pictures.scene_like(seed)
     scene = scene_of(pixels, 96, seed)
     drawn = resvg.render(str(api.export(scene, "svg")), scene.width, scene.height)
-    image, own = target_of(drawn[..., :3]), shown(scene)
+    image, own = planes(drawn[..., :3]), shown(scene)
     return Outcome(not float(psnr(image, own)) >= 35.0, float(flip(image, own)))

@@ -7,13 +7,11 @@ import time
 from collections.abc import Collection
 from typing import Any, NamedTuple
 
-import numpy as np
-import torch
-
 from ..arrays import Float32Array
 from ..export.exported import Exported
 from ..fit.loop import fit_picture
 from ..fit.settings import settings_of
+from ..fit.views import planes
 from ..flip import flip
 from ..image import Picture
 from ..metrics import psnr, ssim
@@ -38,15 +36,10 @@ def measured(picture: Picture, shapes: int, **options: Any) -> tuple[Fitted, Sce
     started, used = time.perf_counter(), _cpu()
     scene = fit_picture(picture, settings)
     seconds, cpu = time.perf_counter() - started, _cpu() - used
-    target = tensor_of(picture)
+    target = planes(picture.premultiplied)
     image = draw(scene, picture.width, picture.height)[: len(target)]
     near, alike, seen = (float(metric(image, target)) for metric in (psnr, ssim, flip))
     return Fitted(near, alike, seen, seconds, cpu), scene
-
-
-def tensor_of(picture: Picture) -> torch.Tensor:
-    """Its pixels [C, H, W], premultiplied where there is alpha."""
-    return torch.from_numpy(np.ascontiguousarray(picture.premultiplied.transpose(2, 0, 1)))
 
 
 def drawn(
@@ -62,11 +55,7 @@ def drawn(
 
 def flip_of(image: Float32Array, picture: Picture) -> float:
     """FLIP of an opaque drawing."""
-    shown, seen = (
-        torch.from_numpy(np.ascontiguousarray(pixels[..., :3].transpose(2, 0, 1), np.float32))
-        for pixels in (image, picture.pixels)
-    )
-    return float(flip(shown, seen))
+    return float(flip(*(planes(pixels[..., :3]) for pixels in (image, picture.pixels))))
 
 
 def _cpu() -> float:

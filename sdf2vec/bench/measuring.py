@@ -12,7 +12,6 @@ from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
-import torch
 from msgspec.structs import replace
 
 from .. import api
@@ -23,6 +22,7 @@ from ..errors import Sdf2vecError
 from ..export.byte_limit import gzipped_size
 from ..export.options import Options
 from ..exports import Exports
+from ..fit.views import planes
 from ..flip import flip
 from ..image import Picture, encode_png, premultiply, unpremultiply
 from ..metrics import psnr, ssim
@@ -59,14 +59,10 @@ class Score(NamedTuple):
 
 def score(drawn: Float32Array, picture: Picture) -> Score:
     """Of a drawing with straight alpha; rounded to eight bits."""
-    target = _planes(picture.premultiplied)
+    target = planes(picture.premultiplied)
     levels = np.rint(premultiply(drawn) * 255.0).astype(np.float32) / 255.0
-    image = _planes(levels)[: len(target)]
+    image = planes(levels)[: len(target)]
     return Score(*(float(metric(image, target)) for metric in (psnr, ssim, flip)))
-
-
-def _planes(pixels: Float32Array) -> torch.Tensor:
-    return torch.from_numpy(np.ascontiguousarray(pixels.transpose(2, 0, 1), dtype=np.float32))
 
 
 def source_of(name: str, picture: Picture, folder: Path) -> Source:

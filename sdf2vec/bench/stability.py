@@ -20,6 +20,7 @@ from .attempts import Attempt, Outcome
 from .catalogue import CASES, Case
 from .chart import save
 from .results import Machine, machine
+from .table import spread
 
 KEPT, PAGE, CHART = "stability.json", "stability.md", "stability.png"
 
@@ -135,8 +136,7 @@ def _rows(cases: Sequence[Case], found: Catalogue) -> Iterator[str]:
 
 
 def _spread(tried: Tried) -> str:
-    flips = tried.flips
-    return f"{median(flips):.3f} ({min(flips):.3f} to {max(flips):.3f})" if flips else ""
+    return spread(tried.flips, 3) if tried.flips else ""
 
 
 def chart(cases: Sequence[Case], found: Catalogue) -> Figure:

@@ -7,6 +7,7 @@ import sys
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from statistics import median
 from typing import TYPE_CHECKING, NamedTuple
 
 from .. import guard
@@ -21,6 +22,12 @@ if TYPE_CHECKING:
 machine: Callable[[], Machine] = deferred("sdf2vec.bench.results", "machine")
 
 SUFFIX = ".md"
+
+
+def spread(values: Sequence[float], digits: int) -> str:
+    """The median, and from the least to the greatest."""
+    middle, least, most = (f"{value:.{digits}f}" for value in (median(values), min(values), max(values)))
+    return f"{middle} ({least} to {most})"
 
 
 class Page(NamedTuple):

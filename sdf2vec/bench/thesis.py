@@ -6,15 +6,15 @@ The printed values are those of its own picture, woman_darkhair at 512 × 512.
 from __future__ import annotations
 
 import argparse
-import statistics
 from collections.abc import Callable, Iterator
+from statistics import median
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from ..deferred import deferred
 from ..image import Picture, load
 from ..scene import Scene
 from . import choices
-from .table import Asked, Page
+from .table import Asked, Page, spread
 
 if TYPE_CHECKING:
     from .fits import Fitted
@@ -51,16 +51,13 @@ class Seeds(NamedTuple):
     cpu: float
 
     def __str__(self) -> str:
-        middle = f"{statistics.median(self.flips):.4f}"
-        return (
-            middle if len(self.flips) == 1 else f"{middle} ({min(self.flips):.4f} to {max(self.flips):.4f})"
-        )
+        return spread(self.flips, 4)
 
 
 def seeds_of(picture: Picture, count: int, seeds: int, **options: Any) -> Seeds:
     """So many fits of the same options; `options` as in `api.fit`."""
     fits = [measured(picture, count, seed=seed, **options)[0] for seed in range(seeds)]
-    return Seeds([fit.flip for fit in fits], statistics.median(fit.cpu for fit in fits))
+    return Seeds([fit.flip for fit in fits], median(fit.cpu for fit in fits))
 
 
 def rows(picture: Picture, seeds: int) -> Iterator[str]:

@@ -128,16 +128,19 @@ class PageTexts:
 def _text(scene: Scene, name: str, options: Options, sorts: Mapping[Structure, Sort]) -> Any:
     readable = structs.replace(options, layout="readable")
     if "table" not in TARGETS[name].host.layouts:
-        return _in_lines(scene, name, readable, shader(scene, name, options).text, sorts)
+        return _around_layers(scene, name, readable, shader(scene, name, readable).text, sorts)
     text = shader(scene, name, readable).text if scene.shape_count <= MOST_READABLE else ""
     if text and len(text.encode()) <= TEXT_LIMIT:
-        return _in_lines(scene, name, readable, text, sorts)
+        return _around_layers(scene, name, readable, text, sorts)
     if fits_constants(scene):
-        return _in_table(scene, name, structs.replace(options, layout="table"))
+        return _around_rows(scene, name, structs.replace(options, layout="table"))
     return shader(scene, name, options).text
 
 
-def _in_lines(scene: Scene, name: str, options: Options, text: str, sorts: Mapping[Structure, Sort]) -> Any:
+def _around_layers(
+    scene: Scene, name: str, options: Options, text: str, sorts: Mapping[Structure, Sort]
+) -> Any:
+    """What is around the layers of a readable text, and the lines of each sort of them."""
     said = [statements_text([one]) for one in statements_of(scene, name, options)]
     if not said:
         return text
@@ -156,7 +159,7 @@ def _in_lines(scene: Scene, name: str, options: Options, text: str, sorts: Mappi
     return {"around": [head, tail], "lines": lines, "odd": odd}
 
 
-def _in_table(scene: Scene, name: str, options: Options) -> dict[str, list[str]]:
+def _around_rows(scene: Scene, name: str, options: Options) -> dict[str, list[str]]:
     """What is around the rows of each of its tables."""
     text = shader(scene, name, options).text
     around = []

@@ -13,6 +13,11 @@ from .surroundings import View
 from .weights import weights_for
 
 
+def planes(pixels: np.ndarray) -> torch.Tensor:
+    """Pixels [H, W, C] as [C, H, W]."""
+    return torch.from_numpy(np.ascontiguousarray(pixels.transpose(2, 0, 1)))
+
+
 def scaled(pixels: np.ndarray, resolution: float) -> torch.Tensor:
     """A picture, premultiplied [H, W, C], scaled down to about resolution² pixels, [C, H, W]; never up.
 
@@ -22,7 +27,7 @@ def scaled(pixels: np.ndarray, resolution: float) -> torch.Tensor:
     factor = resolution if resolution < 1 else min(1.0, resolution / math.sqrt(width * height))
     size = max(1, round(width * factor)), max(1, round(height * factor))
     small = premultiply(resize(unpremultiply(pixels), *size)) if channels == 4 else resize(pixels, *size)
-    return torch.from_numpy(np.ascontiguousarray(small.transpose(2, 0, 1)))
+    return planes(small)
 
 
 def view_of(pixels: np.ndarray, settings: Settings, resolution: float) -> View:
