@@ -31,7 +31,7 @@ HARDLY, LITTLE = 0.2, 0.5  # dB that a small drawing may lose of the picture: a 
 LIKE_RENDER, SAME = 42.0, 99.0  # dB from the render; dB of what is the same
 LARGER = 0.7  # of a size limit: where the finest small drawing takes more, others take too much
 SURE = (
-    0.985  # of a size limit: what keeps within this keeps within the limit when its numbers are fitted again
+    0.98  # of a size limit: what keeps within this keeps within the limit when its numbers are fitted again
 )
 ABOUT = 1.03  # of a size limit, that a drawing which is still to be fitted may seem to take
 
@@ -220,7 +220,8 @@ class Exports:
     ) -> Exported:
         made = draw(self._drawn(scene, grain), options, grain)
         blurs = ", layers blurred together" if grain.runs else ""
-        note = f"drawn small: {grain.units} steps along the shortest side, {grain.colors} of a colour{blurs}"
+        units = grain.for_layers(len(scene.layers)).units
+        note = f"drawn small: {units} steps along the shortest side, {grain.colors} of a colour{blurs}"
         return replace(made, notes=(note, *made.notes))
 
     def _fit_small(self, scene: Scene, grain: Grain) -> Drawable:

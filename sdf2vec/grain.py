@@ -8,7 +8,7 @@ from typing import NamedTuple
 from .blend import OVER
 from .scene import Scene
 
-FEW, MANY = 32, 128  # layers
+FEW, SPARSE, MANY = 32, 64, 128  # layers
 
 
 class Grain(NamedTuple):
@@ -16,7 +16,8 @@ class Grain(NamedTuple):
     steps of `colors` and `opacities`. One more filter is worth blurring this share of the canvas' pixels in vain.
 
     `runs`: into how many runs of layers, at most, it is cut, each blurred as one; 0 where each layer is blurred alone.
-    Of fewer layers than MANY, fewer softnesses (but `fewest`) and filters say as much, and one run.
+    Of fewer layers than MANY, fewer softnesses (but `fewest`) and filters say as much, and one run. Of more than SPARSE
+    the units are smaller, by this power of their number, `shrink`: so are what they draw.
     """
 
     units: int
@@ -26,17 +27,19 @@ class Grain(NamedTuple):
     filter: float = 1.0
     fewest: int = 3
     runs: int = 0
+    shrink: float = 0.0
 
     def for_layers(self, count: int) -> Grain:
         """For a drawing of so many layers."""
         share = math.sqrt(min(1.0, max(count, 1) / MANY))
         softnesses = min(self.softnesses, max(self.fewest, round(self.softnesses * share)))
         runs = self.runs if count >= MANY else min(self.runs, 1)
-        return self._replace(softnesses=softnesses, filter=self.filter / share, runs=runs)
+        units = round(self.units * max(1.0, count / SPARSE) ** self.shrink)
+        return Grain(units, softnesses, self.colors, self.opacities, self.filter / share, self.fewest, runs)
 
     @property
     def name(self) -> str:
-        """What it is called in tables: by its grid, `runs` before that of one with runs."""
+        """What it is called in tables: by its grid for few layers, `runs` before that of one with runs."""
         return f"{'runs' if self.runs else 'small'} {self.units}"
 
 
@@ -44,9 +47,10 @@ GRAINS = (  # finest first
     Grain(4096, 20, 255, 100, 0.8, fewest=20),
     Grain(1024, 12, 255, 100, 0.8, fewest=5),
     Grain(512, 12, 255, 20, 0.6, fewest=5),
-    Grain(256, 8, 51, 10),
-    Grain(256, 0, 51, 10, runs=3),
-    Grain(200, 0, 25, 10, runs=3),
+    Grain(256, 8, 51, 10, shrink=1 / 3),
+    Grain(256, 0, 51, 10, runs=3, shrink=1 / 3),
+    Grain(208, 0, 51, 10, runs=3, shrink=1 / 3),
+    Grain(200, 0, 25, 10, runs=3, shrink=1 / 3),
     Grain(160, 0, 15, 10, runs=3),
 )
 DENSE = GRAINS[4]  # more shapes of it say more of a picture than fewer finer ones, or yet more coarser ones

@@ -89,14 +89,15 @@ def _begun(tensors: SceneTensors, scene: Scene, grain: Grain) -> tuple[Softening
     now on, in place, or none.
     """
     softening, count = None, tensors.layer_count
+    grain = grain.for_layers(count)
     if grain.runs and any(_softest(group) > HARDLY * scene.pixel for group in tensors.groups):
-        softening = Softening.of(tensors, scene.pixel, grain.for_layers(count).runs)
+        softening = Softening.of(tensors, scene.pixel, grain.runs)
         for group in tensors.groups:
             _grow(group, 0.5 * group.falloff, scene.pixel)
             group.falloff.zero_()
     elif count:
         own = torch.cat([group.falloff for group in from_scene(scene).groups])
-        _soften(tensors, own, scene.pixel, grain.for_layers(count).softnesses)
+        _soften(tensors, own, scene.pixel, grain.softnesses)
     settling = [
         Settling(group, _steps(group, grain, tensors.size), partial(_unfold, group, grain))
         for group in tensors.groups

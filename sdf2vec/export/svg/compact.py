@@ -39,8 +39,8 @@ def drawn(drawable: Drawable, grain: Grain) -> tuple[Drawing, float]:
     """
     if drawable.runs:
         return sketched(drawable, grain), 0.0
-    scene = drawable.scene
-    canvas, samples = Canvas.whole(scene, grain.units), layers_at(scene)
+    scene, samples = drawable.scene, layers_at(drawable.scene)
+    canvas = _canvas(scene, grain)
     made = [_blurred(layer, canvas) for layer in scene.layers]
     geometries = [geometry for geometry, _ in made]
     off = {index: difference for index, (_, difference) in enumerate(made) if difference is not None}
@@ -52,8 +52,12 @@ def drawn(drawable: Drawable, grain: Grain) -> tuple[Drawing, float]:
 def sketched(drawable: Drawable, grain: Grain) -> Drawing:
     """The same without all that makes up for what blurs do: of about as many bytes."""
     scene = drawable.scene
-    canvas = Canvas.whole(scene, grain.units)
+    canvas = _canvas(scene, grain)
     return _drawing(scene, [_edge(layer, canvas) for layer in scene.layers], canvas, drawable.runs)
+
+
+def _canvas(scene: Scene, grain: Grain) -> Canvas:
+    return Canvas.whole(scene, grain.for_layers(len(scene.layers)).units)
 
 
 def _drawing(

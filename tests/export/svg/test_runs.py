@@ -1,5 +1,6 @@
 """Drawings whose layers are blurred in runs: what engines make of them, and how they are written."""
 
+import random
 import re
 from xml.etree import ElementTree
 
@@ -61,6 +62,28 @@ def test_it_is_drawn_as_it_was_fitted(engine, deviations, require_engine):
         inner = off[size[1] // 8 : -size[1] // 8, size[0] // 8 : -size[0] // 8]
         assert -10 * np.log10(np.mean((inner if engine == "librsvg" else off) ** 2)) > 38
         assert abs(255 * inner.mean()) < 0.7
+
+
+@pytest.mark.parametrize(("count", "units"), [(1, 256), (64, 256), (216, 384), (512, 512)])
+def test_the_more_layers_the_finer_their_grid(count, units, require_engine):
+    """Beyond 64 with the cube root of their number: numbers are rounded to what is written, and drawn so."""
+    require_engine("resvg")
+    r = random.Random(3)
+    corners = [[(r.uniform(-0.7, 0.7), r.uniform(-0.5, 0.5)) for _ in "abc"] for _ in range(count)]
+    layers = tuple(triangle(*three, falloff=0.05, color=(r.random(), 0.5, 0.1)) for three in corners)
+    found = rounded(Scene(150, 100, layers, GREY), DENSE)
+    corners = np.array([layer.shapes[0].parameters for layer in found.scene.layers])
+    places = (corners + np.tile((0.75, 0.5), 3)) * units
+    assert np.abs(places - np.round(places)).max() < 1e-3
+    text = text_of(found)
+    assert f'viewBox="0 0 {units * 3 // 2} {units}"' in text
+    written = [
+        float(number) for path in re.findall(' d="M([^"]*)"', text) for number in re.findall(r"[\d.]+", path)
+    ]
+    assert all(number == int(number) for number in written)
+    off = premultiply(ENGINES["resvg"].render(text, 150, 100))[..., :3] - drawn(found, 150, 100)
+    assert -10 * np.log10(np.mean(off**2)) > 38
+    assert abs(255 * off.mean()) < 0.7
 
 
 def test_a_filter_says_no_region_where_its_own_will_do():
