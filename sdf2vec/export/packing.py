@@ -251,7 +251,7 @@ class Packer:
             self._wanted(layer, cells, precision)
             for layer, cells in zip(self.scene.layers, self.cells, strict=True)
         ]
-        highest = min(MOST_BITS, max(wanted, default=0))
+        highest = min(MOST_BITS, max([LEAST_BITS, *wanted]))
         least = max(LEAST_BITS, highest - 2**CHOICE_BITS + 1)
         return [min(max(count, least), highest) for count in wanted]
 

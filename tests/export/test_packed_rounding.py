@@ -6,6 +6,9 @@ import numpy as np
 import pytest
 
 import sdf2vec
+from sdf2vec import Layer, Scene, Shape
+from sdf2vec.export.options import Options
+from sdf2vec.exports import share_of_limit
 from sdf2vec.fit import settling
 from sdf2vec.image import load
 from sdf2vec.roundtrip import ROUND_TRIPS
@@ -53,3 +56,15 @@ def test_a_limit_is_kept_to_by_coarser_numbers(require_engine):
     assert 2550 < sizes[0] <= 2700
     assert 2400 < sizes[1] <= 2550
     assert near[0] > near[1] > 15.0
+
+
+@pytest.mark.parametrize("opacity", [0.02, 1.0])
+def test_what_is_very_soft_needs_few_bits_but_some(opacity, require_engine):
+    """The softer and the fainter all layers are, the coarser their places may be."""
+    require_engine("opengl")
+    disc = Shape.of("circle", (0.9, 0.2, 0.1), center=(0.1, -0.1), radius=0.3)
+    scene = Scene(60, 40, (Layer((disc,), 1.5, opacity),), (0.2, 0.4, 0.6))
+    picture = load(sdf2vec.render(scene))
+    made = sdf2vec.exported(scene, "shadertoy", picture=picture, max_bytes=1200)
+    assert nearness(made, scene, picture) > 30.0
+    assert share_of_limit(["shadertoy"], Options(max_bytes=4000))(scene) < 1.0
