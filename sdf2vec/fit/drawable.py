@@ -29,9 +29,9 @@ NARROWEST = (1.1, 1.5)  # pixels: of the narrowest blurs, on which renderers agr
 LEAST_FREE = 1.8  # pixels, from which on softnesses are free
 LEAST = 2.15  # pixels, of a free one: renderers have nothing between it and the narrowest ones
 BLURRED = (  # of layers that are blurred in runs, no longer each by its falloff: at first nothing settles
-    Phase("blurring", 140, 256, rate=0.6, end_rate=0.3, loss=MSE),
-    Phase("settling", 130, 256, rate=0.3, end_rate=0.15, loss=MSE),
-    Phase("settling", 80, 320, rate=0.15, end_rate=0.04, loss=MSE),
+    Phase("blurring", 140, 256, rate=0.3, end_rate=0.15, loss=MSE),
+    Phase("settling", 130, 256, rate=0.15, end_rate=0.08, loss=MSE),
+    Phase("settling", 80, 320, rate=0.08, end_rate=0.02, loss=MSE),
 )
 FINE = (256, 320, 384)  # pixels squared, of these phases, where a run needs them
 FINER = 1.3  # pixels: one of a smaller standard deviation does
