@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 from collections import Counter
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -17,12 +17,12 @@ from msgspec import structs
 
 from ..image import Picture
 from ..paints import FLAT as ONE_COLOR
-from ..quality import psnr_of, quality
+from ..quality import psnr_of
 from ..render.tensors import SceneTensors, from_scene, to_scene
 from ..scene import Scene
 from ..threads import threads_of_its_own
 from .backends import CPU, choose
-from .byte_budget import SLOPE, Share, within
+from .byte_budget import Share, within
 from .description import description_length
 from .digits import concise, fit_concisely
 from .initialization import FAINTEST_GROUND, Layers, background_of, empty_groups
@@ -36,12 +36,14 @@ from .settings import AUTO, Settings, preset_of
 from .simplify import sharing, simplified
 from .sparse import FLOOR, THOROUGH, USUAL, Round, Sizes, error_of, finished, grow, needed, pruned
 from .surroundings import View
+from .targets import meeting, missed, wanted
 from .views import scaled, view_of
 
 THOROUGHLY = 12  # layers, at most, which in the end are tried without even where they matter
 SEARCH, JOINT, LAST = 56, 128, 320  # pixels squared
 FEW = 4  # shapes that are placed by trial, also where their number is given
 LEVELS = 3.5 / 255  # by which pixels of one flat colour differ at most
+STEADY = 1.5 / 255  # by which they do of a drawing: photographs have noise
 FLAT = 0.6  # share of pixels next to the same colour, of a drawing in flat colours
 PHOTOGRAPH, STILL_FLAT = 128, 0.58  # pixels squared, and how flat a drawing is there
 DISCS, LEFT = 16, 0.15  # so many discs leave so much of a soft drawing's variance, and more of a photograph's
@@ -52,7 +54,6 @@ GOOD = 10**-3.5  # mean squared error, 35 dB, of what is surely found
 DOMINANT = 0.15  # share of the most common colour, of a picture that has a ground
 # times the shapes found that are fitted where these alone are not the drawing; then, as many as allowed
 MORE = 2, 4, 12
-TRIES = 4  # fits for a target
 
 
 @dataclass(frozen=True)
@@ -95,16 +96,16 @@ def fitted_picture(
 
 def _within(picture: Picture, settings: Settings, callback: Callback, share: Share) -> Fitted:
     """What a size limit holds: the shapes of a drawing, those that meet a target, or as many as there is room for."""
-    has_target = (settings.target_psnr, settings.target_flip) != (None, None)
+    has_target = _has_target(settings)
     found = None if is_photograph(picture) else _few(picture, settings, callback)
     if has_target and found is None:
         found = _painted(picture, settings, callback)
     if found is not None and share(found.scene) <= 1.0:
         return found
     scene, taken = within(picture, settings, share, callback)
-    met = taken <= 1.0 and not (has_target and _missed(scene, picture, settings) > 0)
-    missed = f"; {_wanted(settings)} is not reached" if has_target else ""
-    return Fitted(scene, f"{_counted(scene)}: {taken:.0%} of the size limit{missed}", met)
+    met = taken <= 1.0 and not (has_target and missed(scene, picture, settings) > 0)
+    unreached = f"; {wanted(settings)} is not reached" if has_target else ""
+    return Fitted(scene, f"{_counted(scene)}: {taken:.0%} of the size limit{unreached}", met)
 
 
 def _few(picture: Picture, settings: Settings, callback: Callback) -> Fitted | None:
@@ -126,7 +127,8 @@ def _few(picture: Picture, settings: Settings, callback: Callback) -> Fitted | N
         if settings.target_psnr is None:
             enough = _enough(picture, settings, found, drawing.sizes.last, callback)
             return Fitted(enough, _counted(enough))
-    painted = fit_concisely(picture, _going_on(settings, found), callback)
+    paint = fit_concisely if settings.shapes != AUTO else meeting
+    painted = paint(picture, _going_on(settings, found), callback)
     as_wanted = settings.shapes == AUTO or (settings.shapes == found.shape_count and settings.loss is None)
     return _told(_nearest([painted, *([found] if as_wanted else [])], picture), picture, settings)
 
@@ -164,8 +166,8 @@ def _told(scene: Scene, picture: Picture, settings: Settings) -> Fitted:
         return Fitted(scene)
     if settings.target_psnr is None:
         return Fitted(scene, _counted(scene))
-    met = _missed(scene, picture, settings) <= 0
-    return Fitted(scene, f"{_counted(scene)}: {_wanted(settings)} is {'' if met else 'not '}reached", met)
+    met = missed(scene, picture, settings) <= 0
+    return Fitted(scene, f"{_counted(scene)}: {wanted(settings)} is {'' if met else 'not '}reached", met)
 
 
 def _may_be_few(settings: Settings) -> bool:
@@ -185,14 +187,14 @@ def _going_on(settings: Settings, found: Scene) -> Settings:
 
 
 def is_flat(picture: Picture) -> bool:
-    """Whether most pixels have the colour of their neighbours."""
-    return flatness(picture.premultiplied) >= FLAT
+    """Whether most pixels have the colour of their neighbours, to within a level."""
+    return flatness(picture.premultiplied, STEADY) >= FLAT
 
 
-def flatness(pixels: np.ndarray) -> float:
-    """The share of pixels [H, W, C] that have the colour of their neighbours."""
-    across = np.abs(np.diff(pixels, axis=1)).max(axis=2, initial=0.0) <= LEVELS
-    down = np.abs(np.diff(pixels, axis=0)).max(axis=2, initial=0.0) <= LEVELS
+def flatness(pixels: np.ndarray, levels: float = LEVELS) -> float:
+    """The share of pixels [H, W, C] that have the colour of their neighbours, about."""
+    across = np.abs(np.diff(pixels, axis=1)).max(axis=2, initial=0.0) <= levels
+    down = np.abs(np.diff(pixels, axis=0)).max(axis=2, initial=0.0) <= levels
     return min(share(across), share(down))
 
 
@@ -300,63 +302,26 @@ def ground_of(target: torch.Tensor) -> torch.Tensor:
     return torch.cat([ground, torch.ones(1)])
 
 
-# --- targets --------------------------------------------------------------------------------------------------
+# --- paintings ------------------------------------------------------------------------------------------------
 
 
 def _painted(picture: Picture, settings: Settings, callback: Callback) -> Fitted:
     """The fit of a picture that is no drawing."""
-    scene = fit_concisely(picture, settings, callback)
     if settings.shapes != AUTO:
-        return Fitted(scene)
-    if settings.target_psnr is None and settings.target_flip is None:
+        return Fitted(fit_concisely(picture, settings, callback))
+    if not _has_target(settings):
+        scene = fit_concisely(picture, settings, callback)
         return Fitted(
             scene, f"{_counted(scene)}: as many as are allowed, for it is no drawing (--max-shapes)"
         )
-    missed = _missed(scene, picture, settings)
-    if missed > 0:
-        return Fitted(scene, f"{_counted(scene)}: {_wanted(settings)} is not reached (--max-shapes)", False)
-    for fewer in _fewer(picture, settings, scene.shape_count, missed, callback):
-        scene = fewer
-    return Fitted(scene, f"{_counted(scene)} reach {_wanted(settings)}")
+    scene = meeting(picture, settings, callback)
+    if missed(scene, picture, settings) > 0:
+        return Fitted(scene, f"{_counted(scene)}: {wanted(settings)} is not reached (--max-shapes)", False)
+    return Fitted(scene, f"{_counted(scene)} reach {wanted(settings)}")
 
 
-def _fewer(
-    picture: Picture, settings: Settings, high: int, above: float, callback: Callback
-) -> Iterator[Scene]:
-    """Scenes of ever fewer shapes that meet the target: what a number misses goes with its logarithm, about.
-
-    `above`: what `high` shapes miss it by, which is at most 0.
-    """
-    low, below = 0, 0.0
-    for _ in range(TRIES):
-        part = below / (below - above) if low else 1.0 + above / SLOPE / max(math.log2(high), 1.0)
-        guess = max(low, 1) * (high / max(low, 1)) ** min(max(part, 0.0), 1.0)
-        count = min(max(math.ceil(guess), low + 1), high - 1)
-        if count <= low:
-            return
-        tried = fit_concisely(picture, structs.replace(settings, shapes=count), callback)
-        missed = _missed(tried, picture, settings)
-        if missed <= 0:
-            high, above = count, missed
-            yield tried
-        else:
-            low, below = count, missed
-
-
-def _missed(scene: Scene, picture: Picture, settings: Settings) -> float:
-    """By how many dB, or about so many, a target is missed; negative where it is more than met."""
-    if settings.target_flip is None:
-        return (settings.target_psnr or 0.0) - psnr_of(scene, picture)
-    seen = quality(scene, picture)
-    ratio = seen.flip / max(settings.target_flip, 1e-6)
-    missed = 2 * SLOPE * math.log2(max(ratio, 1e-6))
-    return missed if settings.target_psnr is None else max(missed, settings.target_psnr - seen.psnr)
-
-
-def _wanted(settings: Settings) -> str:
-    psnr, flip = settings.target_psnr, settings.target_flip
-    words = [f"PSNR {psnr:g} dB"] if psnr is not None else []
-    return " and ".join([*words, *([f"FLIP {flip:g}"] if flip is not None else [])])
+def _has_target(settings: Settings) -> bool:
+    return (settings.target_psnr, settings.target_flip) != (None, None)
 
 
 def _counted(scene: Scene) -> str:

@@ -18,6 +18,7 @@ from .initialization import background_of
 from .loop import Callback
 from .settings import Settings
 from .surroundings import View
+from .targets import SLOPE
 from .thinning import lighter
 from .views import view_of
 
@@ -30,7 +31,6 @@ FITS = 3  # of full length, at most
 # shapes, up to which other seeds come to something else by some tenths of a dB, and probes are no nearer: all fits
 CHANCY = 64  # are made, of the most promising sorts
 NEAREST = 2  # of these
-SLOPE = 1.7  # dB for twice the shapes, about
 RESOLUTION = 128  # pixels squared, where it is seen which shapes matter least
 
 

@@ -151,22 +151,25 @@ OFTEN = Relocation(every=25, share=0.05)
 PRESETS: dict[str, Preset] = {
     "fast": Preset(
         (
-            Phase("coarse", 240, 64, relocation=OFTEN, growth=Growth(16, 25)),
-            Phase("fine", 140, 160, rate=0.6, end_rate=0.03, loss=L1_MSE),
+            Phase("coarse", 200, 80, relocation=OFTEN, growth=Growth(16, 25)),
+            Phase("middle", 120, 144, rate=0.8, end_rate=0.6, relocation=OFTEN),
+            Phase("fine", 60, 256, rate=0.6, end_rate=0.03, loss=L1_MSE),
         )
     ),
     "balanced": Preset(
         (
             Phase("coarse", 300, 96, relocation=OFTEN, growth=Growth(16, 40)),
-            Phase("middle", 330, 128, rate=0.8, end_rate=0.6, relocation=OFTEN),
-            Phase("fine", 180, 320, rate=0.6, end_rate=0.02, loss=L1_MSE_FLIP),
+            Phase("middle", 400, 160, rate=0.8, end_rate=0.6, relocation=OFTEN),
+            Phase("fine", 110, 288, rate=0.6, end_rate=0.2, loss=L1_MSE),
+            Phase("finish", 50, 384, rate=0.2, end_rate=0.02, loss=L1_MSE_FLIP),
         )
     ),
     "best": Preset(
         (
             Phase("coarse", 600, 96, relocation=OFTEN, growth=Growth(16, 40)),
             Phase("middle", 800, 192, rate=0.8, end_rate=0.6, relocation=OFTEN),
-            Phase("fine", 400, 512, rate=0.6, end_rate=0.02, loss=L1_MSE_FLIP),
+            Phase("fine", 300, 512, rate=0.6, end_rate=0.2, loss=L1_MSE),
+            Phase("finish", 100, 512, rate=0.2, end_rate=0.02, loss=L1_MSE_FLIP),
         )
     ),
     # Of the thesis. It leaves open: where shapes start (anywhere), how soft they are then (a twentieth of the shortest

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 import torch
 from PIL import Image, ImageDraw
+from skimage import data
 
 from sdf2vec import Scene, Sdf2vecError, fit, fitted
 from sdf2vec.bench.known_scenes import known_scene
@@ -201,6 +202,14 @@ def test_what_is_no_drawing_gets_as_many_shapes_as_are_allowed():
     assert found.scene.shape_count == 12
     assert "--max-shapes" in found.reason
     assert found.scene == fit(noise(), 12, preset="fast")
+
+
+@pytest.mark.parametrize("name", ["rocket", "camera", "brick"])
+def test_a_photograph_is_no_drawing_however_smooth(name):
+    """Pixels differ from their neighbours by a few levels, hardly by none: no shapes are searched."""
+    picture = load(getattr(data, name)())
+    assert auto.flatness(picture.premultiplied) > auto.FLAT
+    assert not auto.is_flat(picture)
 
 
 def test_a_target_is_met_by_fewer_shapes():

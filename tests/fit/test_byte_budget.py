@@ -81,7 +81,7 @@ def test_the_share_is_that_of_the_largest_export(monkeypatch):
 
 def test_in_a_photograph_no_drawing_is_looked_for(monkeypatch):
     """Smooth everywhere, as photographs are, and many colours."""
-    x, y = np.meshgrid(np.linspace(0, 1, 320), np.linspace(0, 1, 320))
+    x, y = np.meshgrid(np.linspace(0, 1, 640), np.linspace(0, 1, 640))
     hills = [np.sin(12 * x + 3 * y + c) * np.cos(11 * y - 4 * x * y) for c in range(3)]
     picture = load(0.5 + 0.25 * np.stack(hills, axis=2).astype(np.float32))
     assert auto.is_flat(picture)

@@ -101,7 +101,7 @@ def test_progress_and_stopping():
 
     scene = fit_picture(picture(), Settings(4, ("box",), preset="fast"), callback)
     assert [p.step for p in seen] == list(range(1, 8))
-    assert {p.steps for p in seen} == {4 * 240 + 140}  # the first phase from four starts
+    assert {p.steps for p in seen} == {4 * 200 + 180}  # the first phase from four starts
     assert all(math.isfinite(p.loss) for p in seen)
     assert scene.shape_count == 2  # it begins with half of them
 
@@ -117,7 +117,7 @@ def first_phase(pic, until, **options):
     errors = []
 
     def callback(progress):
-        if progress.step % 240 == 0:
+        if progress.step % 200 == 0:
             errors.append(progress.loss)  # of the start under way, of which there may be a nearer one
         return progress.step == until
 
@@ -128,7 +128,7 @@ def test_the_nearest_start_goes_on():
     """Whichever of four it is: for one seed at least, not the last."""
     last = 0
     for seed in range(4):
-        scene, errors = first_phase(busy(), 960, seed=seed, loss="mse")
+        scene, errors = first_phase(busy(), 800, seed=seed, loss="mse")
         assert len(errors) == 4 == len(set(errors))
         assert error(scene, busy()) == pytest.approx(min(errors), rel=0.02)
         last += min(errors) == errors[-1]
@@ -136,8 +136,8 @@ def test_the_nearest_start_goes_on():
 
 
 def test_a_fit_stopped_in_its_second_start_keeps_the_first():
-    first, errors = first_phase(busy(), 240, loss="mse")
-    scene, _ = first_phase(busy(), 243, loss="mse")
+    first, errors = first_phase(busy(), 200, loss="mse")
+    scene, _ = first_phase(busy(), 203, loss="mse")
     assert scene == first
     assert error(scene, busy()) == pytest.approx(errors[0], rel=0.02)
 

@@ -54,4 +54,4 @@ def test_a_callback_stops_a_pilot_too():
     assert fit.stopped
     assert len(seen) <= 10
     assert fit.scene().shape_count == 8  # it begins with half of them
-    assert all(0 <= progress.step <= progress.steps == 2 * 60 + 4 * 240 + 140 for progress in seen)
+    assert all(0 <= progress.step <= progress.steps == 2 * 60 + 4 * 200 + 180 for progress in seen)
