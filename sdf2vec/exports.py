@@ -40,7 +40,8 @@ USUAL_NEAR = 44.0  # dB from the render, where nobody knows how near that is to 
 GAINED, GAINED_ALONE = 5.0, 2.0  # dB, about, that fitting again to a picture brings, and to the render
 STEP = 1.0  # dB between two tries of rounded numbers
 TRIES = 3
-DENSEST = 30.0  # dB from the render; more shapes so coarse say more of a picture than fewer finer ones
+COARSER = 1.0  # dB, than where hardly anything is lost: more shapes so coarse say more than fewer finer ones
+DENSEST = 30.0  # dB from the render, the same where the picture is not known
 
 Phase = Callable[[str], AbstractContextManager[object]]
 
@@ -98,7 +99,8 @@ class Exports:
         if exporter.sketch and exporter.draws(scene, options):
             return exporter.sketch(_rounded(scene, DENSE), options, DENSE)
         rounding = exporter.rounding(scene, options)
-        return rounding(DENSEST).write(scene)[0] if rounding else exporter.from_finest(scene, options)[-1]()
+        aim = self._aim(scene) - COARSER if self.picture else DENSEST
+        return rounding(aim).write(scene)[0] if rounding else exporter.from_finest(scene, options)[-1]()
 
     def sketched(self, target: str, options: Options) -> Exported:
         """One export, about as large as it would be: its numbers are rounded, not fitted again."""
@@ -340,9 +342,14 @@ class Share:
     targets: tuple[str, ...]
     options: Options
     limit: ByteLimit
+    picture: Picture | None = None
+
+    def beside(self, picture: Picture) -> Share:
+        """The same where it is known what is fitted to."""
+        return replace(self, picture=picture)
 
     def __call__(self, scene: Scene) -> float:
-        exports = Exports(scene)
+        exports = Exports(scene, self.picture)
         sizes = [self.limit.share(exports.densest(target, self.options).raw) for target in self.targets]
         return max(sizes) / SURE
 

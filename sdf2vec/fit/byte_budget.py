@@ -23,9 +23,14 @@ from .thinning import lighter
 from .views import view_of
 
 # Of a size limit, above 1 for what is too large. What also has `near(scene, picture)` says by that how near what is
-# written then comes to a picture, in dB, if that is not what the scene's render does.
+# written then comes to a picture, in dB, if that is not what the scene's render does; `beside(picture)` makes what
+# knows the picture.
 Share = Callable[[Scene], float]
-PROBED = 16, 64  # shapes of each sort that are tried first: as many as may be needed, or a quarter of them
+PROBED = (
+    16,
+    96,
+)  # shapes of each sort that are tried first, at least and at most: half as many as may be needed
+FAR = 3.0  # times as many may be needed as were tried, or more of that sort are
 ENOUGH = 0.945  # of the limit, that is to be used
 FITS = 3  # of full length, at most
 # shapes, up to which other seeds come to something else by some tenths of a dB, and probes are no nearer: all fits
@@ -44,6 +49,7 @@ class Probe(NamedTuple):
 
 def within(picture: Picture, settings: Settings, share: Share, callback: Callback) -> tuple[Scene, float]:
     """The nearest scene found that keeps within the limit, and its share; else the ground alone."""
+    share = getattr(share, "beside", lambda picture: share)(picture)
     view = view_of(picture.premultiplied, settings, RESOLUTION)
     nothing = _nothing(picture, settings, view)
     empty = share(nothing)
@@ -94,13 +100,18 @@ def _sorts(settings: Settings) -> Iterator[Settings]:
 
 
 def _probes(picture: Picture, settings: Settings, share: Share, callback: Callback) -> list[Probe]:
-    """What each sort promises: the more there is room for, the more of each are tried."""
+    """What each sort promises: the more there is room for, the more of it are tried."""
     least, most = PROBED
     sorts = list(_sorts(settings))
     first = _probe(sorts[0], picture, share, callback, least)
-    count = min(max(first.wanted // 4, least), most)
+    count = min(max(first.wanted // 2, least), most)
     begun = [first] if count == least else []
-    return begun + [_probe(sort, picture, share, callback, count) for sort in sorts[len(begun) :]]
+    probes = begun + [_probe(sort, picture, share, callback, count) for sort in sorts[len(begun) :]]
+    if count < most:
+        for index, (sort, wanted, _) in enumerate(probes):
+            if wanted > FAR * count:
+                probes[index] = _probe(sort, picture, share, callback, min(wanted // 2, most))
+    return probes
 
 
 def _probe(settings: Settings, picture: Picture, share: Share, callback: Callback, count: int) -> Probe:
