@@ -72,8 +72,8 @@ def test_the_more_layers_the_finer_their_grid(count, units, require_engine):
     corners = [[(r.uniform(-0.7, 0.7), r.uniform(-0.5, 0.5)) for _ in "abc"] for _ in range(count)]
     layers = tuple(triangle(*three, falloff=0.05, color=(r.random(), 0.5, 0.1)) for three in corners)
     found = rounded(Scene(150, 100, layers, GREY), DENSE)
-    corners = np.array([layer.shapes[0].parameters for layer in found.scene.layers])
-    places = (corners + np.tile((0.75, 0.5), 3)) * units
+    said = np.array([layer.shapes[0].parameters for layer in found.scene.layers])
+    places = (said + np.tile((0.75, 0.5), 3)) * units
     assert np.abs(places - np.round(places)).max() < 1e-3
     text = text_of(found)
     assert f'viewBox="0 0 {units * 3 // 2} {units}"' in text
