@@ -35,7 +35,7 @@ class Grain(NamedTuple):
         softnesses = min(self.softnesses, max(self.fewest, round(self.softnesses * share)))
         runs = self.runs if count >= MANY else min(self.runs, 1)
         units = round(self.units * max(1.0, count / SPARSE) ** self.shrink)
-        return Grain(units, softnesses, self.colors, self.opacities, self.filter / share, self.fewest, runs)
+        return self._replace(units=units, softnesses=softnesses, filter=self.filter / share, runs=runs)
 
     @property
     def name(self) -> str:

@@ -127,8 +127,11 @@ def _few(picture: Picture, settings: Settings, callback: Callback) -> Fitted | N
         if settings.target_psnr is None:
             enough = _enough(picture, settings, found, drawing.sizes.last, callback)
             return Fitted(enough, _counted(enough))
-    paint = fit_concisely if settings.shapes != AUTO else meeting
-    painted = paint(picture, _going_on(settings, found), callback)
+    going_on = _going_on(settings, found)
+    if settings.shapes == AUTO:
+        painted, _ = meeting(picture, going_on, callback)
+    else:
+        painted = fit_concisely(picture, going_on, callback)
     as_wanted = settings.shapes == AUTO or (settings.shapes == found.shape_count and settings.loss is None)
     return _told(_nearest([painted, *([found] if as_wanted else [])], picture), picture, settings)
 
@@ -314,8 +317,8 @@ def _painted(picture: Picture, settings: Settings, callback: Callback) -> Fitted
         return Fitted(
             scene, f"{_counted(scene)}: as many as are allowed, for it is no drawing (--max-shapes)"
         )
-    scene = meeting(picture, settings, callback)
-    if missed(scene, picture, settings) > 0:
+    scene, is_met = meeting(picture, settings, callback)
+    if not is_met:
         return Fitted(scene, f"{_counted(scene)}: {wanted(settings)} is not reached (--max-shapes)", False)
     return Fitted(scene, f"{_counted(scene)} reach {wanted(settings)}")
 

@@ -29,8 +29,8 @@ Share = Callable[[Scene], float]
 PROBED = (
     16,
     96,
-)  # shapes of each sort that are tried first, at least and at most: half as many as may be needed
-FAR = 3.0  # times as many may be needed as were tried, or more of that sort are
+)  # shapes of each sort that are tried first, at least and at most: half of what there is room for
+FAR = 3.0  # times as many as were tried: where there is room for more, that sort is tried again
 ENOUGH = 0.945  # of the limit, that is to be used
 FITS = 3  # of full length, at most
 # shapes, up to which other seeds come to something else by some tenths of a dB, and probes are no nearer: all fits

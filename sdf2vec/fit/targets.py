@@ -27,12 +27,13 @@ CLOSE = 1.12  # times the shapes that were too few: nothing between is tried
 TRIES = 4  # fits, before as many shapes are tried as there may be
 
 
-def meeting(picture: Picture, settings: Settings, callback: Callback) -> Scene:
-    """The scene of about the fewest shapes that meets the settings' targets; where none does, that of the most."""
+def meeting(picture: Picture, settings: Settings, callback: Callback) -> tuple[Scene, bool]:
+    """The scene of about the fewest shapes that meets the settings' targets; where none does, that of the most, and
+    False.
+    """
     most = max(settings.most // settings.union, 1)
     layers, slope = _foretold(picture, settings, callback, most)
-    low = len(settings.start.layers) if settings.start else 0
-    high, best, before = most + 1, None, None
+    low, high, best, before = 0, most + 1, None, None
     for number in range(1, TRIES + 2):
         scene = fit_concisely(picture, structs.replace(settings, shapes=layers * settings.union), callback)
         by = missed(scene, picture, settings)
@@ -47,7 +48,7 @@ def meeting(picture: Picture, settings: Settings, callback: Callback) -> Scene:
         if low == most or (best and (near or number >= TRIES)):
             break
         layers = min(max(_scaled(layers, by, slope), low + 1), high - 1) if best or number < TRIES else most
-    return best or scene
+    return best or scene, best is not None
 
 
 def missed(scene: Scene, picture: Picture, settings: Settings) -> float:

@@ -37,7 +37,9 @@ def fits(monkeypatch):
 def met_by(target, **options):
     picture = load(np.full((8, 8, 3), 0.5, np.float32))
     settings = settings_of("auto", target_psnr=target, **{"max_shapes": 256, **options})
-    return len(targets.meeting(picture, settings, lambda progress: False).layers)
+    scene, is_met = targets.meeting(picture, settings, lambda progress: False)
+    assert is_met == (targets.missed(scene, picture, settings) <= 0.0)
+    return len(scene.layers)
 
 
 @pytest.mark.parametrize("slope", [1.2, 1.7, 2.4])
@@ -72,3 +74,8 @@ def test_a_union_counts_as_many_shapes_as_it_has(fits):
     made = fits(lambda layers: 24.0 + 1.7 * math.log2(layers / 90))
     met_by(24.0, union=3, max_shapes=255)
     assert all(shapes % 3 == 0 for _, shapes in made)
+
+
+def test_what_goes_on_from_a_scene_may_need_fewer_shapes_than_that_has(fits):
+    fits(lambda shapes: 24.0 + 1.7 * math.log2(shapes / 30))
+    assert 30 <= met_by(24.0, start=Scene(8, 8, (DISC,) * 100)) <= 40

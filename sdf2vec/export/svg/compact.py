@@ -39,8 +39,8 @@ def drawn(drawable: Drawable, grain: Grain) -> tuple[Drawing, float]:
     """
     if drawable.runs:
         return sketched(drawable, grain), 0.0
-    scene, samples = drawable.scene, layers_at(drawable.scene)
-    canvas = _canvas(scene, grain)
+    scene = drawable.scene
+    canvas, samples = _canvas(scene, grain), layers_at(scene)
     made = [_blurred(layer, canvas) for layer in scene.layers]
     geometries = [geometry for geometry, _ in made]
     off = {index: difference for index, (_, difference) in enumerate(made) if difference is not None}
