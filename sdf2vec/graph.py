@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Callable, Container, Iterable, Iterator, Mapping, Sequence
 
 from .expr import OPERATIONS, Expr, component, const, operation, var
@@ -34,6 +35,25 @@ def substitute(expr: Expr, values: Mapping[Expr, Expr]) -> Expr:
     for node in walk([expr]):
         done[node] = values.get(node) or _rebuild(node, tuple(done[arg] for arg in node.args))
     return done[expr]
+
+
+def opened(expr: Expr) -> Expr:
+    """Sees through the calls of functions that have no local variables and use each argument once at most."""
+    done: dict[Expr, Expr] = {}
+    for node in walk([expr]):
+        args = tuple(done[arg] for arg in node.args)
+        function = node.payload
+        if isinstance(function, Function) and _is_brief(function):
+            done[node] = substitute(opened(function.body), dict(zip(function.parameters, args, strict=True)))
+        else:
+            done[node] = _rebuild(node, args)
+    return done[expr]
+
+
+def _is_brief(function: Function) -> bool:
+    nodes = list(walk([function.body]))
+    uses = Counter(arg for node in nodes for arg in node.args if arg.op != "const")
+    return max(uses.values(), default=0) <= 1 and all(node.op != "let" for node in nodes)
 
 
 def _rebuild(node: Expr, args: tuple[Expr, ...]) -> Expr:

@@ -267,21 +267,21 @@ def _box_outline(
 # --- triangle -----------------------------------------------------------------------------------------------
 
 
-def _side(start: Expr, edge: Expr, turn: Expr) -> Expr:
+@function("sdSide", start=VEC2, edge=VEC2, turn=FLOAT)
+def sd_side(start: Expr, edge: Expr, turn: Expr) -> Expr:
     """Squared distance to an edge, and a number that is positive on the inner side of its line."""
     # moving along the edge does not change the smallest distance, so `along` counts as constant
     along = fixed(clamp(dot(start, edge) / maximum(dot(edge, edge), TINY), 0.0, 1.0))
-    q = start - edge * along
+    q = let("q", start - edge * along)
     return vec2(dot(q, q), turn * _cross(start, edge))
 
 
 @function("sdTriangle", p=VEC2, a=VEC2, b=VEC2, c=VEC2)
 def sd_triangle(p: Expr, a: Expr, b: Expr, c: Expr) -> Expr:
     """Exact distance to a triangle (after Inigo Quilez, "2D distance functions")."""
-    ab, bc, ca = let("ab", b - a), let("bc", c - b), let("ca", a - c)
-    ap, bp, cp = let("ap", p - a), let("bp", p - b), let("cp", p - c)
+    ab, bc, ca = let("ab", b - a), c - b, let("ca", a - c)
     turn = let("turn", select(_cross(ab, ca) < 0.0, -1.0, 1.0))
-    sides = [let(f"side_{i}", _side(*ends, turn)) for i, ends in enumerate(((ap, ab), (bp, bc), (cp, ca)), 1)]
+    sides = [sd_side(p - start, edge, turn) for start, edge in ((a, ab), (b, bc), (c, ca))]
     nearest = let("nearest", minimum(minimum(sides[0], sides[1]), sides[2]))
     return sqrt(nearest.x) * select(nearest.y > 0.0, -1.0, 1.0)
 

@@ -4,18 +4,39 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 from ..paints import PAINTS
 from ..shapes import KINDS
-from ..units import Parameter
+from ..units import COLOR, Parameter
 from .layouts import WORD
 from .records import Variant
 
-CELL_BITS = 4
-CHOICE_BITS = 3  # say how many more bits than the least a layer's fractions have
 COUNT_BITS = 7  # of the number of shapes in a layer
 PLACE = "place"  # the precision of what lies in a layer's box: bits by how sharp its edge is
-AHEAD = 4  # words that a shader may read beyond a shape
+
+
+class Boxes(NamedTuple):
+    """Bits with which each layer says its box: the cells that it may touch, and how many more bits than the least its
+    fractions of that box have.
+    """
+
+    cell: int
+    choice: int
+
+    @property
+    def across(self) -> int:
+        """Cells along a side of the grid."""
+        return 1 << self.cell
+
+    @property
+    def spread(self) -> int:
+        """How many more bits than the least a fraction may have."""
+        return (1 << self.choice) - 1
+
+
+OWN = Boxes(cell=4, choice=3)  # a box for each layer: a pixel elsewhere skips it
+SHARED = Boxes(cell=0, choice=0)  # one box for all: nothing is skipped, and nothing says where
 
 
 @dataclass(frozen=True)
@@ -40,13 +61,19 @@ def by_precision(parameters: Iterable[Parameter]) -> list[Parameter]:
 class Layout:
     """Where the numbers of a packed layer are.
 
-    A layer is: its box of cells, bits more than the least, variant (or with joins: number of shapes), falloff,
-    opacity; then its shapes: (variant, join, smoothness,) colours, places. With joins all shapes of a layer are as
-    long as the longest could be.
+    A layer is: its box of cells and bits more than the least, if it has its own; variant (or with joins: number of
+    shapes), falloff, opacity; then its shapes: (variant, join, smoothness,) colours, places. With joins all shapes of
+    a layer are as long as the longest could be. Where all colours are grey, a single fraction says one.
     """
 
     variants: tuple[Variant, ...]
     joins: tuple[str, ...]
+    boxes: Boxes = OWN
+    is_grey: bool = False
+
+    def width(self, parameter: Parameter) -> int:
+        """How many fractions say a parameter."""
+        return 1 if self.is_grey and parameter.unit is COLOR else parameter.width
 
     @property
     def variant_bits(self) -> int:
@@ -59,7 +86,7 @@ class Layout:
     @property
     def head(self) -> int:
         """Bits before the falloff."""
-        return 4 * CELL_BITS + CHOICE_BITS + (COUNT_BITS if self.joins else self.variant_bits)
+        return 4 * self.boxes.cell + self.boxes.choice + (COUNT_BITS if self.joins else self.variant_bits)
 
     def before_shapes(self, precision: Precision) -> int:
         """Bits before the first shape."""
@@ -72,8 +99,8 @@ class Layout:
     def counts(self, variant: Variant) -> tuple[int, int]:
         """How many fractions of a shape have the colours' precision, and how many that of places."""
         parameters = (*PAINTS[variant.paint].parameters, *KINDS[variant.kind].parameters)
-        places = sum(p.width for p in parameters if p.unit.codec.precision == PLACE)
-        return sum(p.width for p in parameters) - places, places
+        places = sum(self.width(p) for p in parameters if p.unit.codec.precision == PLACE)
+        return sum(map(self.width, parameters)) - places, places
 
     def most(self) -> tuple[int, int]:
         """The most of either that any variant has."""
@@ -84,6 +111,11 @@ class Layout:
         """Bits of the longest shape whose places have so many."""
         colors, places = self.most()
         return self.before_numbers(precision) + colors * precision.color + places * count
+
+    def window(self, precision: Precision, count: int) -> int:
+        """Words that a shader looks at for a shape whose places have so many bits, and what is before it."""
+        longest = WORD + self.before_shapes(precision) + self.longest(precision, count)
+        return -(-longest // WORD) + 1
 
 
 class Stream:
@@ -98,9 +130,9 @@ class Stream:
         self._value |= value << self.bits
         self.bits += bits
 
-    def words(self, ahead: int) -> tuple[int, ...]:
-        """All words, and so many empty ones that a shader may read ahead."""
-        count = -(-self.bits // WORD) + ahead
+    def words(self, least: int) -> tuple[int, ...]:
+        """All words, and empty ones up to so many."""
+        count = max(-(-self.bits // WORD), least)
         raw = self._value
         mask = (1 << WORD) - 1
         return tuple((raw >> (WORD * i)) & mask for i in range(count))

@@ -14,10 +14,11 @@ from ..scene import Scene
 from ..steps import Steps
 from ..units import Parameter
 from .exported import Exported
-from .packed_bits import PLACE, Precision
+from .packed_bits import OWN, PLACE, SHARED, Boxes, Layout, Precision
 from .packing import Packed, Packer
 from .rounding import Bits, Chooser, Rounded
 
+GREY = 1.5 / 255.0  # by which the channels of a grey may differ, all of which are fitted again
 ROOM = 0.01  # scene units that a fit may move edges by without other cells
 LOOKED_AT = dict(zip(PRECISIONS, (1, 5, 5, 5), strict=True))  # bits at first; of places, in falloffs
 LEAST = dict(zip(PRECISIONS, (-4, 2, 2, 2), strict=True))
@@ -27,10 +28,14 @@ MOST = dict(zip(PRECISIONS, (12, 16, 14, 14), strict=True))
 class PackedRounding:
     """A scene as words: for how near they are to be, in dB from its render, what they can say and the text."""
 
-    def __init__(self, scene: Scene, slack: float, text: Callable[[Scene, Packed], Exported]) -> None:
+    def __init__(
+        self, scene: Scene, slack: float, text: Callable[[Scene, Packed], Exported], boxes: Boxes = OWN
+    ) -> None:
         self.slack, self.text = slack, text
-        self.packer = Packer(scene, slack + ROOM)
-        self.chooser = Chooser.of(scene, _counts(scene), self._said, LOOKED_AT, LEAST, MOST)
+        self.packer = Packer(scene, slack + ROOM, boxes, GREY)
+        self.chooser = Chooser.of(
+            scene, _counts(scene, self.packer.layout), self._said, LOOKED_AT, LEAST, MOST
+        )
 
     def __call__(self, aim: float) -> Rounded:
         precision = _precision(self.chooser.bits(aim))
@@ -63,14 +68,25 @@ class PackedRounding:
         return Steps.between(low, high, 2.0**bits - 1.0)
 
 
+class SmallestPacked:
+    """The same with a box for each layer, or where that takes fewer bytes with one for all, when none is skipped."""
+
+    def __init__(self, scene: Scene, slack: float, text: Callable[[Scene, Packed], Exported]) -> None:
+        self.scene = scene
+        self.ways = [PackedRounding(scene, slack, text, boxes) for boxes in (OWN, SHARED)]
+
+    def __call__(self, aim: float) -> Rounded:
+        return min((way(aim) for way in self.ways), key=lambda made: len(made.write(self.scene)[0].raw))
+
+
 def _precision(bits: Bits) -> Precision:
     return Precision(bits["place"], bits["falloff"], bits["color"], bits["opacity"])
 
 
-def _counts(scene: Scene) -> dict[str, int]:
-    """How many numbers there are of each precision."""
+def _counts(scene: Scene, layout: Layout) -> dict[str, int]:
+    """How many fractions there are of each precision."""
     found = dict.fromkeys(PRECISIONS, 0)
     for layer in scene.layers:
         for slot in slots(layer.structure):
-            found[slot.parameter.unit.codec.precision] += slot.parameter.width
+            found[slot.parameter.unit.codec.precision] += layout.width(slot.parameter)
     return {name: count for name, count in found.items() if count}

@@ -33,26 +33,24 @@ from ..render.tensors import from_scene
 from ..scene import Joint, Layer, Scene, Shape
 from ..shapes import KINDS
 from ..threads import threads_of_its_own
-from ..units import ANGLE, COLOR_DECIMALS, FREQUENCY, GEOMETRY_DECIMALS, Fractions, Parameter
+from ..units import ANGLE, COLOR, COLOR_DECIMALS, FREQUENCY, Fractions, Parameter
 from .layouts import WORD
 from .packed_bits import (
-    AHEAD,
-    CELL_BITS,
-    CHOICE_BITS,
     COUNT_BITS,
-    PLACE,
+    OWN,
+    Boxes,
     Layout,
     Precision,
     Stream,
     by_precision,
 )
-from .records import Variant, first_records, joins_of, variant_of, variants_of
+from .packed_numbers import Coder, Ends
+from .records import first_records, joins_of, variant_of, variants_of
 from .tiles import Grid, layer_bounds
 
 LIMIT = 0.95  # 8-bit levels: largest error of the picture; drawing adds less than 0.05
 CANVAS = (1920, 1080)  # pixels, for which the error is measured
 SAMPLE = 1 << 21  # shapes × pixels that are looked at where no kernels are worth compiling
-CELLS = 16  # along the longer side of the grid
 BLOCKS, MANY = 4, 256  # of cells along a side, where there are more layers than so many
 LEAST_BITS, MOST_BITS = 4, 24  # of a fraction; a float holds no more
 FEWER = 5  # bits that all layers begin without, when the fewest are looked for
@@ -62,12 +60,10 @@ BLAME = (
 )
 WORST = 4096  # pixels that are looked at in each round
 BLAMED = 1 << 20  # layers × pixels that are looked at at a time
+GREY = 0.1 / 255.0  # by which the channels of a grey may differ
 FAINT = 0.05  # opacity below which layers are not told apart
 
 Limits = tuple[float, float]
-Ends = tuple[
-    list[float], list[float]
-]  # of the components of a parameter: where its fractions are 0, and where 1
 
 CORNER, BOX = var("corner", VEC2), var("box", VEC2)
 
@@ -89,8 +85,7 @@ class Packed:
     least: int  # bits of a fraction, at least
     precision: Precision
     ranges: Ranges
-    variants: tuple[Variant, ...]
-    joins: tuple[str, ...]
+    layout: Layout
     error: float
 
 
@@ -98,7 +93,9 @@ class Packed:
 
 
 def decoded(parameter: Parameter, fractions: Sequence[Expr], ranges: Ranges) -> Expr:
-    """A parameter from its fractions 0..1; `corner` and `box` are the layer's cells."""
+    """A parameter from its fractions 0..1, or a single one of all its components; `corner` and `box` are the layer's
+    cells.
+    """
     width = parameter.width
     value = fractions[0] if width == 1 else operation(VECTOR[width].value, *fractions)
     return parameter.unit.codec.decode(value, Fractions(CORNER, BOX, ranges))
@@ -152,7 +149,7 @@ def _fewest_bits(
     counts = np.array(packer.bit_counts(precision)) - FEWER
     picture = view.picture(packer.scene)
     for _ in range(ROUNDS):
-        counts = np.maximum(counts, max(LEAST_BITS, counts.max() - 2**CHOICE_BITS + 1))
+        counts = np.maximum(counts, max(LEAST_BITS, counts.max() - packer.boxes.spread))
         off = np.abs(view.picture(packer.quantised(precision, counts.tolist())) - picture).max(axis=0) * 255.0
         if off.max() <= limit:
             return counts.tolist(), float(off.max())
@@ -225,14 +222,14 @@ def _rows(which: torch.Tensor, tensor: torch.Tensor) -> torch.Tensor:
 class Packer:
     """Turns the layers of one scene into bits and back. Their cells leave room for edges to move by `slack`."""
 
-    def __init__(self, scene: Scene, slack: float) -> None:
-        self.scene = scene
+    def __init__(self, scene: Scene, slack: float, boxes: Boxes = OWN, grey: float = GREY) -> None:
+        self.scene, self.boxes = scene, boxes
         self.ranges = ranges_of(scene)
         self.variants, self.joins = variants_of(scene), joins_of(scene)
-        self.layout = Layout(self.variants, self.joins)
-        boxes = _boxes(scene, slack) if scene.layers else None
-        self.grid = Grid(1, 1, 1.0, (0.0, 0.0)) if boxes is None else _grid_of(boxes)
-        self.cells = [] if boxes is None else _cells_of(boxes, self.grid)
+        self.layout = Layout(self.variants, self.joins, boxes, is_grey=_is_grey(scene, grey))
+        bounds = _bounds(scene, slack, boxes) if scene.layers else None
+        self.grid = Grid(1, 1, 1.0, (0.0, 0.0)) if bounds is None else _grid_of(bounds, boxes.across)
+        self.cells = [] if bounds is None else _cells_of(bounds, self.grid)
         self.finest = min(CANVAS)
         self._ends = cache(lambda cells, parameter: _ends_of(parameter, self.ranges, *self._box(cells)))
         self._said: dict[int, tuple[int, Precision, Layer]] = {}  # of each layer the last that was asked for
@@ -252,7 +249,7 @@ class Packer:
             for layer, cells in zip(self.scene.layers, self.cells, strict=True)
         ]
         highest = min(MOST_BITS, max([LEAST_BITS, *wanted]))
-        least = max(LEAST_BITS, highest - 2**CHOICE_BITS + 1)
+        least = max(LEAST_BITS, highest - self.boxes.spread)
         return [min(max(count, least), highest) for count in wanted]
 
     def _wanted(self, layer: Layer, cells: tuple[int, ...], precision: Precision) -> int:
@@ -287,7 +284,8 @@ class Packer:
     def _near(self, view: _View, chosen: IntArray) -> Iterator[tuple[IntArray, IntArray]]:
         """Layers and pixels that may have to do with each other: each block of cells with what touches it."""
         boxes = np.array(self.cells)
-        side = CELLS // BLOCKS if len(boxes) > MANY else CELLS
+        across = self.boxes.across
+        side = across // BLOCKS if len(boxes) > MANY else across
         low, per_unit = self.grid.low, self.grid.per_unit
         columns = np.floor((view.x[chosen].numpy() - low[0]) * per_unit).astype(int) // side
         rows = np.floor((view.y[chosen].numpy() - low[1]) * per_unit).astype(int) // side
@@ -299,7 +297,7 @@ class Packer:
 
     def moved(self, scene: Scene, slack: float) -> Packer:
         """The same for layers that have moved a little: they keep their cells where they are still within."""
-        packer, now = copy(self), _cells_of(_boxes(scene, slack), self.grid)
+        packer, now = copy(self), _cells_of(_bounds(scene, slack, self.boxes), self.grid)
         kept = [
             old if old[0] <= new[0] and old[1] <= new[1] and old[2] >= new[2] and old[3] >= new[3] else new
             for old, new in zip(self.cells, now, strict=True)
@@ -313,22 +311,22 @@ class Packer:
 
     def pack(self, precision: Precision, counts: Sequence[int], error: float = 0.0) -> Packed:
         least = min(counts, default=1)
-        stream = Stream()
+        stream, last = Stream(), 0
         for layer, cells, count in zip(self.scene.layers, self.cells, counts, strict=True):
             for place in cells:
-                stream.put(place, CELL_BITS)
-            stream.put(count - least, CHOICE_BITS)
+                stream.put(place, self.boxes.cell)
+            stream.put(count - least, self.boxes.choice)
             for value, bits in self._layer(layer, cells, count, precision)[0]:
                 stream.put(value, bits)
-        words = stream.words(AHEAD + self.layout.longest(precision, least + 2**CHOICE_BITS) // WORD)
-        shared = (self.grid, least, precision, self.ranges, self.variants, self.joins, error)
-        return Packed(words, stream.bits, *shared)
+            last = stream.bits - self.layout.longest(precision, count)  # where the last shape may begin
+        words = stream.words(last // WORD + self.layout.window(precision, least + self.boxes.spread))
+        return Packed(words, stream.bits, self.grid, least, precision, self.ranges, self.layout, error)
 
     def _layer(
         self, layer: Layer, cells: tuple[int, ...], count: int, precision: Precision
     ) -> tuple[list[tuple[int, int]], Layer]:
         """The numbers of a layer with their bits, and the layer that they say."""
-        coder = _Coder(partial(self._ends, cells), precision, count)
+        coder = Coder(partial(self._ends, cells), precision, count)
         if self.joins:
             coder.whole(len(layer.shapes) - 1, COUNT_BITS)
         else:
@@ -342,7 +340,7 @@ class Packer:
             joints.append(joint)
         return coder.numbers, Layer(tuple(shapes), falloff, opacity, tuple(joints[1:]))
 
-    def _shape(self, shape: Shape, joint: Joint | None, coder: _Coder) -> tuple[Joint, Shape]:
+    def _shape(self, shape: Shape, joint: Joint | None, coder: Coder) -> tuple[Joint, Shape]:
         start, said = coder.bits, Joint()
         if self.joins:
             joint = joint or Joint(self.joins[0], 0.0)
@@ -352,7 +350,11 @@ class Packer:
         values: dict[Parameter, list[float]] = {}
         given = _by_parameter(shape)
         for parameter in by_precision(given):
-            values[parameter] = coder.values(given[parameter], parameter)
+            if self.layout.width(parameter) < parameter.width:
+                level = coder.level(given[parameter], parameter)
+                values[parameter] = [level] * parameter.width
+            else:
+                values[parameter] = coder.values(given[parameter], parameter)
         if self.joins:
             coder.fill(start + self.layout.longest(coder.precision, coder.count))
         color, *own = (values[parameter] for parameter in PAINTS[shape.paint].parameters)
@@ -393,73 +395,46 @@ def _by_parameter(shape: Shape) -> dict[Parameter, list[float]]:
     return {parameter: [next(rest) for _ in range(parameter.width)] for parameter in declared}
 
 
-class _Coder:
-    """Collects whole numbers with their bits, for one layer; each method returns the value that its number says."""
-
-    def __init__(self, ends: Callable[[Parameter], Ends], precision: Precision, count: int) -> None:
-        self.numbers: list[tuple[int, int]] = []
-        self.bits = 0
-        self.ends, self.precision, self.count = ends, precision, count
-
-    def whole(self, value: int, bits: int) -> int:
-        self.numbers.append((value, bits))
-        self.bits += bits
-        return value
-
-    def fill(self, bits: int) -> None:
-        """Nothing, up to so many bits in all."""
-        while self.bits < bits:
-            self.whole(0, min(WORD, bits - self.bits))
-
-    def value(self, value: float, parameter: Parameter) -> float:
-        """A parameter of one component."""
-        (said,) = self.values([value], parameter)
-        return said
-
-    def values(self, values: Sequence[float], parameter: Parameter) -> list[float]:
-        """All components of a parameter."""
-        codec = parameter.unit.codec
-        bits = self.count if codec.precision == PLACE else getattr(self.precision, codec.precision)
-        ends = zip(values, *self.ends(parameter), strict=True)
-        return [_legal(self._said(value, low, high, bits, parameter), parameter) for value, low, high in ends]
-
-    def _said(self, value: float, low: float, high: float, bits: int, parameter: Parameter) -> float:
-        """What the fraction with so many bits stands for that comes nearest to a value."""
-        codec, most = parameter.unit.codec, (1 << bits) - 1
-        value = value % math.tau if parameter.unit is ANGLE else value
-        start, end = codec.root(low), codec.root(high)
-        step = round(min(max(codec.step(value, start, end, most), 0.0), most))
-        said: float = codec.said(self.whole(step, bits), start, end, most)
-        return said
+def _is_grey(scene: Scene, within: float) -> bool:
+    """Whether the channels of each colour differ by no more."""
+    colors = [
+        values
+        for layer in scene.layers
+        for shape in layer.shapes
+        for parameter, values in _by_parameter(shape).items()
+        if parameter.unit is COLOR
+    ]
+    return all(max(values) - min(values) <= within for values in colors)
 
 
-def _legal(value: float, parameter: Parameter) -> float:
-    """What a scene takes: a length that must be positive may have become 0."""
-    least = parameter.unit.low + (10.0**-GEOMETRY_DECIMALS if parameter.positive else 0.0)
-    return min(max(value, least), parameter.unit.high)
-
-
-def _grid_of(boxes: Float64Array) -> Grid:
+def _grid_of(boxes: Float64Array, across: int) -> Grid:
     """A grid that holds everything."""
     low, high = boxes[:, :2].min(axis=0), boxes[:, 2:].max(axis=0)
     size = float((high - low).max()) * (1.0 + 1e-5)
     corner = (_rounded(low[0] - 2e-6 * size), _rounded(low[1] - 2e-6 * size))
-    return Grid(CELLS, CELLS, _rounded_down(CELLS / size), corner)
+    return Grid(across, across, _rounded_down(across / size), corner)
 
 
 def _cells_of(boxes: Float64Array, grid: Grid) -> list[tuple[int, ...]]:
     """The cells (low x, low y, high x, high y) that each layer may touch."""
     places = np.floor((boxes - np.array([*grid.low, *grid.low])) * grid.per_unit + [-1e-4, -1e-4, 1e-4, 1e-4])
-    return [tuple(box) for box in np.clip(places, 0, CELLS - 1).astype(int).tolist()]
+    return [tuple(box) for box in np.clip(places, 0, grid.columns - 1).astype(int).tolist()]
 
 
-def _boxes(scene: Scene, slack: float) -> Float64Array:
-    """For each layer a box that holds its coverage, and its shapes, also those that only take away; [L, 4]."""
-    boxes, firsts = layer_bounds(scene, slack).boxes, first_records(scene.layers)
-    alone = (Layer((shape,), layer.falloff) for layer in scene.layers for shape in layer.shapes)
+def _bounds(scene: Scene, slack: float, boxes: Boxes) -> Float64Array:
+    """For each layer a box that holds its shapes, also those that only take away, and where it has a box of its own
+    its coverage; [L, 4].
+    """
+    is_own = boxes.cell > 0
+    alone = (
+        Layer((shape,), layer.falloff if is_own else 0.0) for layer in scene.layers for shape in layer.shapes
+    )
     shapes = layer_bounds(replace(scene, layers=tuple(alone)), slack).boxes
-    low = np.minimum(boxes[:, :2], np.minimum.reduceat(shapes[:, :2], firsts))
-    high = np.maximum(boxes[:, 2:], np.maximum.reduceat(shapes[:, 2:], firsts))
+    firsts = first_records(scene.layers)
+    low, high = np.minimum.reduceat(shapes[:, :2], firsts), np.maximum.reduceat(shapes[:, 2:], firsts)
+    if is_own:
+        covered = layer_bounds(scene, slack).boxes
+        low, high = np.minimum(covered[:, :2], low), np.maximum(covered[:, 2:], high)
     return np.concatenate([low, high], axis=1)
 
 

@@ -50,7 +50,7 @@ packed_text: Callable[..., Any] = deferred(
     "sdf2vec.export.packed_text", "PackedText"
 )  # needs torch, as all below
 pack: Callable[[Scene, float], Packed] = deferred("sdf2vec.export.packing", "pack")
-packed_rounding: Callable[..., Any] = deferred("sdf2vec.export.packed_rounding", "PackedRounding")
+packed_rounding: Callable[..., Any] = deferred("sdf2vec.export.packed_rounding", "SmallestPacked")
 SEEN = var("{seen}", VEC4)  # where a template puts the colour that is seen
 MOST_READABLE = TEXT_LIMIT // 50  # shapes; none is said in so few bytes
 TEXTS = ("readable", "table", "packed")  # layouts that may take few bytes
@@ -491,7 +491,7 @@ def _packed(job: _Job) -> dict[str, Any]:
     packed = job.packed or pack(job.scene, job.slack)
     text = packed_text(packed, job.scene, job.dialect, job.motion(var("float(i)")))
     part = text.part() | {"coarsest": literal(COARSEST), "moving": bool(job.slack)}
-    functions = job.functions([*text.roots, grid_point(P, P, P)])
+    functions = job.functions(text.roots)
     return {"functions": functions, "packed": part, "error": packed.error}
 
 

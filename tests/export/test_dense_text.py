@@ -27,8 +27,47 @@ def test_declared_names_are_short_and_members_stay():
         "float blend(vec2 place) { return place.x + sin(place.y); }\nvoid mainImage() { blend(vec2(1.0)); }"
     )
     assert dense(text, renamed=True).splitlines()[1] == (
-        "float b(vec2 a){return a.x+sin(a.y);}void mainImage(){b(vec2(1.));}"
+        "float a(vec2 b){return b.x+sin(b.y);}void mainImage(){a(vec2(1.));}"
     )
+
+
+@pytest.mark.parametrize(
+    ("text", "wanted"),
+    [
+        (  # each function has names of its own, which may be the same; what all see keeps its
+            "int kept; float one(float first) { return first + kept; } float two(float second) { return second; }",
+            "int a;float b(float d){return d+a;}float c(float d){return d;}",
+        ),
+        (  # behind commas, within loops, and with what is around them in brackets
+            "void go() { vec2 low = vec2(here, far), high = low; for (int at = 0, i = 0; at < 3; at++) low += high; }",
+            "void a(){vec2 b=vec2(here,far),d=b;for(int c=0,e=0;c<3;c++)b+=d;}",
+        ),
+        (  # a parameter hides what is outside; what a text does not declare has its name to itself
+            "int same; int f(int same) { return same + a + b; } int g() { return same; }",
+            "int c;int d(int f){return f+a+b;}int e(){return c;}",
+        ),
+        (
+            "float far;\n#define NEAR far\nfloat end() { return NEAR; }",
+            "float a;\n#define NEAR a\nfloat b(){return NEAR;}",
+        ),
+        ("void go(out vec4 one, in vec2 two) { one.x = two.x; }", "void a(out vec4 b,in vec2 c){b.x=c.x;}"),
+    ],
+)
+def test_names_are_short_where_they_are_seen(text, wanted):
+    assert dense(text, renamed=True).split("\n", 1)[1] == f"{wanted}\n"
+
+
+@pytest.mark.parametrize(
+    ("text", "wanted"),
+    [
+        ("float a = 1.0; float b = a; vec2 c; vec2 d[2]; int e;", "float a=1.,b=a;vec2 c,d[2];int e;"),
+        ("float a; float f(float x) { float b; return b; }", "float a;float f(float x){float b;return b;}"),
+        ("const int a = 1; int b; a = b; int c;", "const int a=1;int b;a=b;int c;"),
+        ("for (int i = 0; i < 3; i++) { int a; int b; } int c;", "for(int i=0;i<3;i++){int a,b;}int c;"),
+    ],
+)
+def test_names_of_one_type_are_declared_together(text, wanted):
+    assert dense(text, renamed=False) == f"// Made with sdf2vec\n{wanted}\n"
 
 
 @pytest.mark.parametrize("compositing", ["over", "additive"])
