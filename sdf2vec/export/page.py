@@ -32,7 +32,7 @@ from .svg import svg
 
 FALLBACK = 1 << 20  # pixels
 NEAR, MANY = 57.0, 256  # dB that the page's scene is from the one it was made of, where it has so many shapes
-SLOPE, NEAREST = 32.0, 105.0  # fewer can have more: by ten times fewer, and at most
+SLOPE, FARTHEST, NEAREST = 32.0, 46.0, 105.0  # fewer can have more: by ten times fewer; at least, and at most
 POLICY = "what the page may do"  # where the template has it
 SCRIPT = re.compile(r'<script type="module">(.*?)</script>', re.DOTALL)
 STYLE = re.compile(r"<style>(.*?)</style>", re.DOTALL)
@@ -80,7 +80,7 @@ def html(scene: Scene, options: Options) -> Exported:
 
 def _aim(shapes: int) -> float:
     """How near the page's scene is to be: half as many shapes can have numbers that are three times as fine."""
-    return min(NEAR + SLOPE * math.log10(max(1.0, MANY / max(shapes, 1))), NEAREST)
+    return min(max(NEAR + SLOPE * math.log10(MANY / max(shapes, 1)), FARTHEST), NEAREST)
 
 
 def _form(scene: Scene) -> Form:
