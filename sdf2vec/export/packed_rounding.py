@@ -69,11 +69,16 @@ class PackedRounding:
 
 
 class SmallestPacked:
-    """The same with a box for each layer, or where that takes fewer bytes with one for all, when none is skipped."""
+    """The same with a box for each layer; or, where it `may_share` and that takes fewer bytes, with one for all: none
+    is skipped then, which takes some GPUs twice as long.
+    """
 
-    def __init__(self, scene: Scene, slack: float, text: Callable[[Scene, Packed], Exported]) -> None:
+    def __init__(
+        self, scene: Scene, slack: float, text: Callable[[Scene, Packed], Exported], may_share: bool
+    ) -> None:
         self.scene = scene
-        self.ways = [PackedRounding(scene, slack, text, boxes) for boxes in (OWN, SHARED)]
+        ways = (OWN, SHARED) if may_share else (OWN,)
+        self.ways = [PackedRounding(scene, slack, text, boxes) for boxes in ways]
 
     def __call__(self, aim: float) -> Rounded:
         return min((way(aim) for way in self.ways), key=lambda made: len(made.write(self.scene)[0].raw))

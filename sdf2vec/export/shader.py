@@ -152,7 +152,7 @@ def rounding(scene: Scene, options: Options, name: str, suffix: str) -> Rounding
         text = dense(made.text, renamed=target.host is PASTED)
         return Exported(text, {}, (f"{made.about}; {DENSE}",))
 
-    made: Rounding = packed_rounding(scene, slack, write)
+    made: Rounding = packed_rounding(scene, slack, write, options.max_bytes is not None)
     return made
 
 

@@ -73,8 +73,9 @@ def test_what_is_very_soft_needs_few_bits_but_some(opacity, require_engine):
     assert share_of_limit(["shadertoy"], Options(max_bytes=4000))(scene) < 1.0
 
 
-def smallest(scene):
-    found = shader.rounding(scene, Options(framing="fit", layout="packed"), "shadertoy", ".glsl")
+def smallest(scene, limit=4000):
+    options = Options(framing="fit", layout="packed", max_bytes=limit)
+    found = shader.rounding(scene, options, "shadertoy", ".glsl")
     assert isinstance(found, SmallestPacked)
     return found
 
@@ -114,6 +115,7 @@ def test_one_box_for_all_takes_fewer_bytes_where_shapes_are_large(require_engine
     own, shared = (packing(40.0).write(large)[0].raw for packing in packings(large))
     assert len(shared) < len(own) - 200
     assert smallest(large)(40.0).write(large)[0].raw == shared
+    assert smallest(large, limit=None)(40.0).write(large)[0].raw == own  # some GPUs are slower with it
 
 
 def test_a_grey_is_one_number(require_engine):
