@@ -176,10 +176,10 @@ def test_the_default_shadertoy_of_256_shapes(photo, require_engine):
 
 
 def test_the_packed_shadertoy_of_256_shapes(photo, require_engine):
-    """At most 62 bytes a triangle, and within a level of the render on a full HD canvas (a part is looked at here)."""
+    """At most 60 bytes a triangle, and within a level of the render on a full HD canvas (a part is looked at here)."""
     require_engine("opengl")
     made = shader(photo, "shadertoy", Options(title="coffee", framing="fit", layout="packed"))
-    assert len(made.text.encode()) <= 62 * 256
+    assert len(made.text.encode()) <= 60 * 256
     assert levels(shown(made, 480, 270), rendered(photo, 480, 270)) <= 1.0
 
 
