@@ -22,6 +22,7 @@ from ..operation import VEC2, VEC3, VEC4
 from ..scene import Scene
 from .tensors import Group, SceneTensors, from_scene
 
+DISPLAYED = 1 << 22  # numbers that are clamped at a time
 CHUNK = 1 << 22  # layers × pixels held at a time
 
 
@@ -44,8 +45,11 @@ def render(
 
 
 def displayed(image: torch.Tensor) -> torch.Tensor:
-    """What a screen shows of premultiplied RGBA [4, H, W]: clamped."""
-    return torch.stack(_display()(*image))
+    """What a screen shows of premultiplied RGBA [4, H, W]: clamped. In parts, for a large picture takes much memory."""
+    parts, shown = max(1, image.numel() // DISPLAYED), torch.empty_like(image)
+    for part, of in zip(shown.chunk(parts, 1), image.chunk(parts, 1), strict=True):
+        part.copy_(torch.stack(_display()(*of)))
+    return shown
 
 
 def composite(tensors: SceneTensors, width: int, height: int) -> torch.Tensor:
