@@ -97,7 +97,7 @@ def fitted_picture(
 def _within(picture: Picture, settings: Settings, callback: Callback, share: Share) -> Fitted:
     """What a size limit holds: the shapes of a drawing, those that meet a target, or as many as there is room for."""
     has_target = _has_target(settings)
-    found = None if is_photograph(picture) else _few(picture, settings, callback)
+    found = _few(picture, settings, callback)
     if has_target and found is None:
         found = _painted(picture, settings, callback)
     if found is not None and share(found.scene) <= 1.0:
@@ -113,7 +113,7 @@ def _few(picture: Picture, settings: Settings, callback: Callback) -> Fitted | N
     if not _may_be_few(settings):
         return None
     flat = is_flat(picture)
-    if settings.shapes == AUTO and not flat and not _is_soft(picture):
+    if settings.shapes == AUTO and (is_photograph(picture) or (not flat and not _is_soft(picture))):
         return None
     drawing = Drawing(picture, settings, callback, flat)
     found = drawing.found()

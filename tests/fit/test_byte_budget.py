@@ -90,8 +90,9 @@ def test_in_a_photograph_no_drawing_is_looked_for(monkeypatch):
         np.pad(np.full((60, 80, 3), 0.3, np.float32), ((99, 99), (99, 99), (0, 0)), constant_values=0.8)
     )
     assert not auto.is_photograph(drawing)
-    monkeypatch.setattr(auto, "_few", lambda *given: pytest.fail("looked for a drawing"))
+    monkeypatch.setattr(auto, "Drawing", lambda *given: pytest.fail("looked for a drawing"))
     fitted(picture, preset="fast", kind="circle", max_falloff=0.0, share=by_count(5))
+    assert fitted(picture, preset="fast", kind="circle", max_shapes=5).scene.shape_count == 5
 
 
 @pytest.mark.parametrize("is_wanted", [True, False])
