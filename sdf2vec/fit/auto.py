@@ -51,6 +51,7 @@ DISC_RESOLUTION = 48
 UNLIKELY = 1.5  # of the most shapes: a picture that needs more is no drawing
 SOFT_MOST = 16  # shapes of a soft drawing
 GOOD = 10**-3.5  # mean squared error, 35 dB, of what is surely found
+FAR = 10**-2.5  # 25 dB, of what is not yet the picture
 DOMINANT = 0.15  # share of the most common colour, of a picture that has a ground
 # times the shapes found that are fitted where these alone are not the drawing; then, as many as allowed
 MORE = 2, 4, 12
@@ -137,7 +138,9 @@ def _few(picture: Picture, settings: Settings, callback: Callback) -> Fitted | N
 
 
 def _enough(picture: Picture, settings: Settings, found: Scene, view: View, callback: Callback) -> Scene:
-    """What goes on from what was found with ever more shapes, as long as that makes the description shorter."""
+    """What goes on from what was found with ever more shapes, as long as that makes the description shorter; what is
+    far from the picture tries them all.
+    """
     best, shortest = found, description_length(from_scene(found), view)
     for times in (*MORE, math.inf):
         count = min(max(times * found.shape_count, FEW), settings.most)
@@ -146,9 +149,10 @@ def _enough(picture: Picture, settings: Settings, found: Scene, view: View, call
         more = structs.replace(settings, start=best if best.layers else None, shapes=int(count))
         tried = fit_concisely(picture, more, callback)
         length = description_length(from_scene(tried), view)
-        if length >= shortest:
+        if length < shortest:
+            best, shortest = tried, length
+        elif error_of(from_scene(best), view) <= FAR:
             break
-        best, shortest = tried, length
     return best
 
 

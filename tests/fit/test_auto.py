@@ -324,6 +324,21 @@ def test_a_drawing_of_other_things_takes_more_shapes_while_its_description_gets_
     assert enough.shape_count == 4
 
 
+@pytest.mark.parametrize(("off", "wanted"), [(0.1, 24), (0.02, 2)])
+def test_what_is_far_from_a_drawing_tries_all_numbers(off, wanted, monkeypatch):
+    """Also where the next shapes alone do not pay for themselves, as those of a glyph; what is near does not."""
+    bits = {2: 100.0, 4: 120.0, 8: 130.0, 24: 50.0, 48: 60.0}
+    monkeypatch.setattr(auto, "description_length", lambda scene, view: bits[scene.layer_count])
+    monkeypatch.setattr(
+        auto, "fit_concisely", lambda picture, settings, callback: _hidden(settings.shapes, 0.5 - off)
+    )
+    picture = Picture(np.full((64, 64, 3), 0.5, np.float32))
+    view = View(torch.from_numpy(picture.pixels).permute(2, 0, 1), None)
+    found = _hidden(2, 0.5 - off)
+    enough = auto._enough(picture, settings_of(max_shapes=48), found, view, lambda progress: False)
+    assert enough.shape_count == wanted
+
+
 def test_a_round_that_only_takes_layers_away_does_not_end_the_search():
     """Its error may be a little higher than before: that says nothing about how many more are needed."""
     drawing = auto.Drawing(noise(), settings_of(), lambda progress: False, flat=True)
