@@ -31,7 +31,7 @@ PROBED = (
     96,
 )  # shapes of each sort that are tried first, at least and at most: half of what there is room for
 FAR = 3.0  # times as many as were tried: where there is room for more, that sort is tried again
-ENOUGH = 0.97  # of the limit, that is to be used
+ENOUGH = 0.975  # of the limit, that is to be used
 FITS = 3  # of full length, at most
 # shapes, up to which other seeds come to something else by some tenths of a dB, and probes are no nearer: all fits
 CHANCY = 64  # are made, of the most promising sorts
