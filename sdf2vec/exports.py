@@ -15,7 +15,7 @@ from msgspec import structs
 from .declared import check_choice
 from .deferred import deferred
 from .export import EXPORTERS, Exporter
-from .export.byte_limit import ByteLimit
+from .export.byte_limit import ByteLimit, gzipped_size
 from .export.exported import Exported
 from .export.options import PICTURE, Options
 from .export.rounding import COARSEST, FINEST, Rounded, Rounding
@@ -29,6 +29,8 @@ if TYPE_CHECKING:
 
 HARDLY, LITTLE = 0.2, 0.5  # dB that a small drawing may lose of the picture: a coarse one, a finer one
 LIKE_RENDER, SAME = 42.0, 99.0  # dB from the render; dB of what is the same
+WORTH = 1.0  # dB that twice the bytes gzipped are to bring
+MOST_LOST = 3.0  # dB of the picture that are lost for fewer bytes, at most
 LARGER = 0.7  # of a size limit: where the finest small drawing takes more, others take too much
 SURE = (
     0.98  # of a size limit: what keeps within this keeps within the limit when its numbers are fitted again
@@ -149,7 +151,9 @@ class Exports:
         yield exporter.from_finest(scene, options)[0]()
 
     def _near_enough(self, exporter: Exporter, scene: Scene, options: Options) -> Exported | None:
-        """The smallest drawing that loses hardly anything of the picture."""
+        """The smallest drawing that loses hardly anything of the picture; where all lose more, the finest of them or
+        one like the render, whichever says more with its bytes.
+        """
         wanted = options.svg_fidelity == PICTURE and self.picture is not None
         if not wanted or not (exporter.draw and exporter.draws(scene, options)):
             return None
@@ -157,14 +161,21 @@ class Exports:
             return None
         for grain in USUAL:
             drawn, most = self._drawn(scene, grain), self._most_lost(scene, grain)
-            if self._lost_by(scene, drawn.scene) > most:
+            if self._lost_by(scene, drawn.scene) > most and grain is not USUAL[-1]:
                 continue
             made = exporter.draw(drawn, options, grain)
             lost = self._lost_by(scene, drawn.scene, (made.error / 255) ** 2)
             if lost <= most:
-                note = f"{exporter.suffix[1:]}: drawn small, {self._told(scene, lost)}"
-                return replace(made, notes=(note, *made.notes))
-        return None
+                break
+        else:
+            like = exporter.from_finest(scene, options)[0]()
+            gained = lost - self._lost_by(scene, scene, 10 ** (-LIKE_RENDER / 10))
+            if lost > MOST_LOST or gained >= WORTH * math.log2(
+                gzipped_size(like.raw) / gzipped_size(made.raw)
+            ):
+                return like
+        note = f"{exporter.suffix[1:]}: drawn small, {self._told(scene, lost)}"
+        return replace(made, notes=(note, *made.notes))
 
     def _told(self, scene: Scene, lost: float) -> str:
         """What a drawing loses of the picture; where that is much because the scene is so near, what it comes to."""

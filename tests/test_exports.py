@@ -12,7 +12,7 @@ from sdf2vec import Exported, Scene, Sdf2vecError, cli, exports
 from sdf2vec.export import EXPORTERS, Exporter
 from sdf2vec.export.options import Accepts, Options
 from sdf2vec.exports import Exports
-from sdf2vec.fit import conversion
+from sdf2vec.fit import conversion, settling
 from sdf2vec.fit.presets import PRESETS
 from sdf2vec.image import Picture
 from sdf2vec.metrics import psnr
@@ -129,3 +129,26 @@ def test_a_sketched_page_holds_a_small_drawing():
     exports = Exports(scene, Picture(np.random.default_rng(0).random((40, 60, 3), np.float32)))
     sketched, made = (len(one.raw) for one in (exports.sketched("html", Options()), exports.export("html")))
     assert sketched == pytest.approx(made, rel=0.05)
+
+
+@pytest.mark.parametrize(
+    ("worth", "most", "is_small"), [(99.0, 99.0, True), (0.0, 99.0, False), (99.0, 0.0, False)]
+)
+def test_where_small_drawings_lose_much_bytes_decide(worth, most, is_small, monkeypatch):
+    """One like the render is written where it says more with them, or where small ones lose more than a few dB."""
+    monkeypatch.setattr(settling, "PHASES", [replace(phase, steps=2) for phase in settling.PHASES])
+    monkeypatch.setattr(exports, "WORTH", worth)
+    monkeypatch.setattr(exports, "MOST_LOST", most)
+    like_render = 10 ** (-exports.LIKE_RENDER / 10)
+    monkeypatch.setattr(
+        Exports, "_lost_by", lambda self, scene, found, error=0.0: 0.5 if error == like_render else 1.5
+    )
+    monkeypatch.setattr(Exports, "_most_lost", lambda self, scene, grain: 1.0)
+    monkeypatch.setattr(Exports, "_told", lambda self, scene, lost: f"{lost} dB lost")
+    scene = random_scene(("circle", "box"), layers=12, seed=3, joins=(), paints=("flat",))
+    picture = Picture(np.ascontiguousarray(sdf2vec.render(scene)[..., :3]))
+    like = sdf2vec.exported(scene, "svg", svg_fidelity="render")
+    made = sdf2vec.exported(scene, "svg", picture=picture)
+    assert (len(made.raw) < 0.7 * len(like.raw)) is is_small
+    assert (made.data == like.data) is not is_small
+    assert made.notes == (("svg: drawn small, 1.5 dB lost",) if is_small else like.notes)
