@@ -142,8 +142,8 @@ def _enough(picture: Picture, settings: Settings, found: Scene, view: View, call
     far from the picture tries them all.
     """
     best, shortest = found, description_length(from_scene(found), view)
-    for times in (*MORE, math.inf):
-        count = min(max(times * found.shape_count, FEW), settings.most)
+    counts = (min(max(times * max(found.shape_count, 1), FEW), settings.most) for times in (*MORE, math.inf))
+    for count in dict.fromkeys(counts):
         if count <= best.shape_count:
             continue
         more = structs.replace(settings, start=best if best.layers else None, shapes=int(count))

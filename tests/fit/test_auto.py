@@ -324,18 +324,26 @@ def test_a_drawing_of_other_things_takes_more_shapes_while_its_description_gets_
     assert enough.shape_count == 4
 
 
-@pytest.mark.parametrize(("off", "wanted"), [(0.1, 24), (0.02, 2)])
-def test_what_is_far_from_a_drawing_tries_all_numbers(off, wanted, monkeypatch):
+@pytest.mark.parametrize(
+    ("found", "off", "tried", "wanted"),
+    [(2, 0.1, [4, 8, 24, 48], 24), (2, 0.02, [4], 2), (0, 0.1, [4, 12, 48], 12), (0, 0.02, [4], 0)],
+)
+def test_what_is_far_from_a_drawing_tries_all_numbers(found, off, tried, wanted, monkeypatch):
     """Also where the next shapes alone do not pay for themselves, as those of a glyph; what is near does not."""
-    bits = {2: 100.0, 4: 120.0, 8: 130.0, 24: 50.0, 48: 60.0}
+    bits = {found: 100.0, 4: 120.0, 8: 130.0, 12: 55.0, 24: 50.0, 48: 60.0}
     monkeypatch.setattr(auto, "description_length", lambda scene, view: bits[scene.layer_count])
-    monkeypatch.setattr(
-        auto, "fit_concisely", lambda picture, settings, callback: _hidden(settings.shapes, 0.5 - off)
-    )
+    asked = []
+
+    def fitted_with(picture, settings, callback):
+        asked.append(settings.shapes)
+        return _hidden(settings.shapes, 0.5 - off)
+
+    monkeypatch.setattr(auto, "fit_concisely", fitted_with)
     picture = Picture(np.full((64, 64, 3), 0.5, np.float32))
     view = View(torch.from_numpy(picture.pixels).permute(2, 0, 1), None)
-    found = _hidden(2, 0.5 - off)
-    enough = auto._enough(picture, settings_of(max_shapes=48), found, view, lambda progress: False)
+    scene = _hidden(found, 0.5 - off)
+    enough = auto._enough(picture, settings_of(max_shapes=48), scene, view, lambda progress: False)
+    assert asked == tried
     assert enough.shape_count == wanted
 
 
