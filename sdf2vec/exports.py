@@ -30,7 +30,7 @@ if TYPE_CHECKING:
 HARDLY, LITTLE = 0.2, 0.5  # dB that a small drawing may lose of the picture: a coarse one, a finer one
 LIKE_RENDER, SAME = 42.0, 99.0  # dB from the render; dB of what is the same
 WORTH = 1.0  # dB that twice the bytes gzipped are to bring
-MOST_LOST = 3.0  # dB of the picture that are lost for fewer bytes, at most
+MOST_LOST = 5.0  # dB of the picture that are lost for fewer bytes, at most
 LARGER = 0.7  # of a size limit: where the finest small drawing takes more, others take too much
 SURE = (
     0.98  # of a size limit: what keeps within this keeps within the limit when its numbers are fitted again
