@@ -28,7 +28,8 @@ if TYPE_CHECKING:
     from .image import Picture
 
 HARDLY, LITTLE = 0.2, 0.5  # dB that a small drawing may lose of the picture: a coarse one, a finer one
-LIKE_RENDER, SAME = 42.0, 99.0  # dB from the render; dB of what is the same
+LIKE_RENDER_ERROR = 10**-4.2  # mean squared, of what is 42 dB from the render
+SAME = 99.0  # dB of what is the same
 WORTH = 1.0  # dB that twice the bytes gzipped are to bring
 MOST_LOST = 5.0  # dB of the picture that are lost for fewer bytes, at most
 LARGER = 0.7  # of a size limit: where the finest small drawing takes more, others take too much
@@ -169,7 +170,7 @@ class Exports:
                 break
         else:
             like = exporter.from_finest(scene, options)[0]()
-            gained = lost - self._lost_by(scene, scene, 10 ** (-LIKE_RENDER / 10))
+            gained = lost - self._lost_by(scene, scene, LIKE_RENDER_ERROR)
             if lost > MOST_LOST or gained >= WORTH * math.log2(
                 gzipped_size(like.raw) / gzipped_size(made.raw)
             ):
@@ -191,7 +192,7 @@ class Exports:
         """How many dB of the picture a small drawing may lose: the finest, as many as one like the render."""
         if grain is not USUAL[-1]:
             return HARDLY if grain is USUAL[0] else LITTLE
-        return max(LITTLE, 10 * math.log10(1.0 + 10 ** ((self._near(scene) - LIKE_RENDER) / 10)))
+        return max(LITTLE, self._lost_by(scene, scene, LIKE_RENDER_ERROR))
 
     def _lost_by(self, scene: Scene, found: Scene, error: float = 0.0) -> float:
         """How many dB of the picture another scene loses whose mean squared error is larger by so much."""

@@ -139,9 +139,10 @@ def test_where_small_drawings_lose_much_bytes_decide(worth, most, is_small, monk
     monkeypatch.setattr(settling, "PHASES", [replace(phase, steps=2) for phase in settling.PHASES])
     monkeypatch.setattr(exports, "WORTH", worth)
     monkeypatch.setattr(exports, "MOST_LOST", most)
-    like_render = 10 ** (-exports.LIKE_RENDER / 10)
     monkeypatch.setattr(
-        Exports, "_lost_by", lambda self, scene, found, error=0.0: 0.5 if error == like_render else 1.5
+        Exports,
+        "_lost_by",
+        lambda self, scene, found, error=0.0: 0.5 if error == exports.LIKE_RENDER_ERROR else 1.5,
     )
     monkeypatch.setattr(Exports, "_most_lost", lambda self, scene, grain: 1.0)
     monkeypatch.setattr(Exports, "_told", lambda self, scene, lost: f"{lost} dB lost")

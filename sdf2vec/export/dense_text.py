@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 from collections import Counter
-from collections.abc import Container, Iterator, Sequence
+from collections.abc import Container, Iterator, Mapping, Sequence
 from itertools import chain, product
 from string import ascii_letters
 
@@ -18,6 +18,7 @@ TYPE = re.compile(r"float|int|bool|void|[iu]?vec[234]|mat[234]")
 NAME = re.compile(r"[A-Za-z_]\w*")
 DECLARED = ("=", ",", ";", "[", ")")  # what may follow a name that is declared
 KEPT = {"main", "mainImage"}
+MEMBER = "."  # what is before the name of a component
 EVERYWHERE = ""  # the scope of what is declared outside functions
 
 
@@ -52,31 +53,20 @@ def _short(token: str) -> str:
     return f"{whole}.{part}" if whole or part else "0."
 
 
-def _declared_together(tokens: Sequence[str]) -> Iterator[str]:
+def _declared_together(tokens: Sequence[str]) -> list[str]:
     """Statements that declare names of one type as a single one."""
-    depth, declares = 0, ""  # within brackets; the type that the statement declares names of
+    found: list[str] = []
+    declares = ""  # the type that the statement declares names of
     for index, token in enumerate(tokens):
-        depth += (token in "([") - (token in ")]")
-        starts = index == 0 or tokens[index - 1] in "{};"
-        again = starts and depth == 0 and token == declares and _is_declared(tokens, index + 1)
-        if starts and not again:
-            declares = token if TYPE.fullmatch(token) and _is_declared(tokens, index + 1) else ""
-        if token in "{}":
-            declares = ""
-        if token == ";" and _goes_on(tokens, index, declares, depth):
-            yield ","
-        elif not again:
-            yield token
-
-
-def _goes_on(tokens: Sequence[str], index: int, declares: str, depth: int) -> bool:
-    """Whether the statement after one that declares names of a type declares more of them."""
-    return (
-        bool(declares)
-        and depth == 0
-        and tokens[index + 1 : index + 2] == [declares]
-        and _is_declared(tokens, index + 2)
-    )
+        if index == 0 or tokens[index - 1] in "{};":
+            before, declares = declares, ""
+            if TYPE.fullmatch(token) and _is_declared(tokens, index + 1):
+                declares = token
+            if declares and declares == before and found[-1] == ";":
+                found[-1] = ","
+                continue
+        found.append(token)
+    return found
 
 
 def _is_declared(tokens: Sequence[str], index: int) -> bool:
@@ -91,37 +81,36 @@ def _renamed(tokens: Sequence[str]) -> list[str]:
     """
     scopes = list(_scopes(tokens))
     declared = _declarations(tokens, scopes)
-    counts = Counter(
-        (scope if token in declared[scope] else EVERYWHERE, token)
-        for token, scope, is_member in zip(tokens, scopes, _members(tokens), strict=True)
-        if not is_member and (token in declared[scope] or token in declared[EVERYWHERE])
-    )
-    kept = {
-        token
-        for token, scope, is_member in zip(tokens, scopes, _members(tokens), strict=True)
-        if not is_member and token not in declared[scope] and token not in declared[EVERYWHERE]
-    }
+    owners = list(_owners(tokens, scopes, declared))
+    counts = Counter(zip(owners, tokens, strict=True))
+    kept = {token for (owner, token) in counts if owner is None}
     names: dict[str, dict[str, str]] = {}
     for scope in declared:
         taken = kept | set(names.get(EVERYWHERE, {}).values())
-        mine = [name for (where, name), _ in counts.most_common() if where == scope]
+        mine = [name for (owner, name), _ in counts.most_common() if owner == scope]
         names[scope] = dict(zip(mine, _names(taken), strict=False))
     return [
-        _said(token, names[EVERYWHERE] | names[scope], is_member)
-        for token, scope, is_member in zip(tokens, scopes, _members(tokens), strict=True)
+        names[owner][token] if owner in names else _in_line(token, names[EVERYWHERE])
+        for token, owner in zip(tokens, owners, strict=True)
     ]
 
 
-def _said(token: str, names: dict[str, str], is_member: bool) -> str:
-    """A token with its new name, or those in a line for the preprocessor."""
-    if token[0] == "#":
-        return re.sub(r"\b\w+\b", lambda match: names.get(match[0], match[0]), token)
-    return token if is_member else names.get(token, token)
+def _owners(
+    tokens: Sequence[str], scopes: Sequence[str], declared: Mapping[str, Container[str]]
+) -> Iterator[str | None]:
+    """The scope that declares each token, MEMBER of a component's name; none declares what is no name."""
+    before = ""
+    for token, scope in zip(tokens, scopes, strict=True):
+        owner = next((where for where in (scope, EVERYWHERE) if token in declared[where]), None)
+        yield MEMBER if before == MEMBER else owner
+        before = token
 
 
-def _members(tokens: Sequence[str]) -> Iterator[bool]:
-    """Which are names of components."""
-    yield from (index > 0 and tokens[index - 1] == "." for index in range(len(tokens)))
+def _in_line(token: str, names: Mapping[str, str]) -> str:
+    """A line for the preprocessor, with new names; anything else as it is."""
+    if token[0] != "#":
+        return token
+    return re.sub(r"\b\w+\b", lambda match: names.get(match[0], match[0]), token)
 
 
 def _scopes(tokens: Sequence[str]) -> Iterator[str]:

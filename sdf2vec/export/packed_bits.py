@@ -25,6 +25,11 @@ class Boxes(NamedTuple):
     choice: int
 
     @property
+    def is_shared(self) -> bool:
+        """Whether all layers have the same."""
+        return self.cell == 0
+
+    @property
     def across(self) -> int:
         """Cells along a side of the grid."""
         return 1 << self.cell

@@ -26,7 +26,7 @@ class PackedText:
         self.packed, self.dialect = packed, dialect
         self.layout = layout = packed.layout
         self.form = Form(layout.variants, layout.joins, scene.compositing)
-        self.is_shared = not layout.boxes.cell  # one box for all layers, one number of bits
+        self.is_shared = layout.boxes.is_shared
         opacity, falloff = (self._field(parameter) for parameter in LOOK)
         self.drawn = opened(drawn_by(self.form, var("float(kind)"), opacity, falloff, motion))
         self.joined = joined_by(layout.joins, var("float(join)"), var("smoothness")) if layout.joins else None

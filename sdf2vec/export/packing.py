@@ -149,7 +149,7 @@ def _fewest_bits(
     counts = np.array(packer.bit_counts(precision)) - FEWER
     picture = view.picture(packer.scene)
     for _ in range(ROUNDS):
-        counts = np.maximum(counts, max(LEAST_BITS, counts.max() - packer.boxes.spread))
+        counts = np.maximum(counts, max(LEAST_BITS, counts.max() - packer.layout.boxes.spread))
         off = np.abs(view.picture(packer.quantised(precision, counts.tolist())) - picture).max(axis=0) * 255.0
         if off.max() <= limit:
             return counts.tolist(), float(off.max())
@@ -223,7 +223,7 @@ class Packer:
     """Turns the layers of one scene into bits and back. Their cells leave room for edges to move by `slack`."""
 
     def __init__(self, scene: Scene, slack: float, boxes: Boxes = OWN, grey: float = GREY) -> None:
-        self.scene, self.boxes = scene, boxes
+        self.scene = scene
         self.ranges = ranges_of(scene)
         self.variants, self.joins = variants_of(scene), joins_of(scene)
         self.layout = Layout(self.variants, self.joins, boxes, is_grey=_is_grey(scene, grey))
@@ -249,7 +249,7 @@ class Packer:
             for layer, cells in zip(self.scene.layers, self.cells, strict=True)
         ]
         highest = min(MOST_BITS, max([LEAST_BITS, *wanted]))
-        least = max(LEAST_BITS, highest - self.boxes.spread)
+        least = max(LEAST_BITS, highest - self.layout.boxes.spread)
         return [min(max(count, least), highest) for count in wanted]
 
     def _wanted(self, layer: Layer, cells: tuple[int, ...], precision: Precision) -> int:
@@ -284,7 +284,7 @@ class Packer:
     def _near(self, view: _View, chosen: IntArray) -> Iterator[tuple[IntArray, IntArray]]:
         """Layers and pixels that may have to do with each other: each block of cells with what touches it."""
         boxes = np.array(self.cells)
-        across = self.boxes.across
+        across = self.layout.boxes.across
         side = across // BLOCKS if len(boxes) > MANY else across
         low, per_unit = self.grid.low, self.grid.per_unit
         columns = np.floor((view.x[chosen].numpy() - low[0]) * per_unit).astype(int) // side
@@ -297,7 +297,7 @@ class Packer:
 
     def moved(self, scene: Scene, slack: float) -> Packer:
         """The same for layers that have moved a little: they keep their cells where they are still within."""
-        packer, now = copy(self), _cells_of(_bounds(scene, slack, self.boxes), self.grid)
+        packer, now = copy(self), _cells_of(_bounds(scene, slack, self.layout.boxes), self.grid)
         kept = [
             old if old[0] <= new[0] and old[1] <= new[1] and old[2] >= new[2] and old[3] >= new[3] else new
             for old, new in zip(self.cells, now, strict=True)
@@ -314,12 +314,12 @@ class Packer:
         stream, last = Stream(), 0
         for layer, cells, count in zip(self.scene.layers, self.cells, counts, strict=True):
             for place in cells:
-                stream.put(place, self.boxes.cell)
-            stream.put(count - least, self.boxes.choice)
+                stream.put(place, self.layout.boxes.cell)
+            stream.put(count - least, self.layout.boxes.choice)
             for value, bits in self._layer(layer, cells, count, precision)[0]:
                 stream.put(value, bits)
             last = stream.bits - self.layout.longest(precision, count)  # where the last shape may begin
-        words = stream.words(last // WORD + self.layout.window(precision, least + self.boxes.spread))
+        words = stream.words(last // WORD + self.layout.window(precision, least + self.layout.boxes.spread))
         return Packed(words, stream.bits, self.grid, least, precision, self.ranges, self.layout, error)
 
     def _layer(
@@ -425,14 +425,15 @@ def _bounds(scene: Scene, slack: float, boxes: Boxes) -> Float64Array:
     """For each layer a box that holds its shapes, also those that only take away, and where it has a box of its own
     its coverage; [L, 4].
     """
-    is_own = boxes.cell > 0
     alone = (
-        Layer((shape,), layer.falloff if is_own else 0.0) for layer in scene.layers for shape in layer.shapes
+        Layer((shape,), 0.0 if boxes.is_shared else layer.falloff)
+        for layer in scene.layers
+        for shape in layer.shapes
     )
     shapes = layer_bounds(replace(scene, layers=tuple(alone)), slack).boxes
     firsts = first_records(scene.layers)
     low, high = np.minimum.reduceat(shapes[:, :2], firsts), np.maximum.reduceat(shapes[:, 2:], firsts)
-    if is_own:
+    if not boxes.is_shared:
         covered = layer_bounds(scene, slack).boxes
         low, high = np.minimum(covered[:, :2], low), np.maximum(covered[:, 2:], high)
     return np.concatenate([low, high], axis=1)

@@ -114,7 +114,7 @@ def _few(picture: Picture, settings: Settings, callback: Callback) -> Fitted | N
     if not _may_be_few(settings):
         return None
     flat = is_flat(picture)
-    if settings.shapes == AUTO and (is_photograph(picture) or (not flat and not _is_soft(picture))):
+    if settings.shapes == AUTO and is_photograph(picture, flat):
         return None
     drawing = Drawing(picture, settings, callback, flat)
     found = drawing.found()
@@ -205,10 +205,12 @@ def flatness(pixels: np.ndarray, levels: float = LEVELS) -> float:
     return min(share(across), share(down))
 
 
-def is_photograph(picture: Picture) -> bool:
-    """Whether a picture is surely no drawing: smooth where it is large, and not flat where it is small, nor soft."""
-    small = scaled(picture.premultiplied, PHOTOGRAPH).permute(1, 2, 0).numpy()
-    return flatness(small) < STILL_FLAT and not _is_soft(picture)
+def is_photograph(picture: Picture, flat: bool) -> bool:
+    """Whether a picture, `flat` at its own size or not, is no drawing: not flat, or not where it is small; nor soft."""
+    if flat:
+        small = scaled(picture.premultiplied, PHOTOGRAPH).permute(1, 2, 0).numpy()
+        flat = flatness(small) >= STILL_FLAT
+    return not flat and not _is_soft(picture)
 
 
 def share(chosen: np.ndarray) -> float:

@@ -110,7 +110,7 @@ def test_what_is_drawn_is_what_is_read_back(options, require_engine):
             assert compare(ROUND_TRIPS["shadertoy"][0], made, scene, size).psnr > 25.0
 
 
-def test_one_box_for_all_takes_fewer_bytes_where_shapes_are_large(require_engine):
+def test_one_box_for_all_takes_fewer_bytes_where_shapes_are_large():
     large = triangles(12, 24)
     own, shared = (packing(40.0).write(large)[0].raw for packing in packings(large))
     assert len(shared) < len(own) - 200

@@ -85,11 +85,11 @@ def test_in_a_photograph_no_drawing_is_looked_for(monkeypatch):
     hills = [np.sin(12 * x + 3 * y + c) * np.cos(11 * y - 4 * x * y) for c in range(3)]
     picture = load(0.5 + 0.25 * np.stack(hills, axis=2).astype(np.float32))
     assert auto.is_flat(picture)
-    assert auto.is_photograph(picture)
+    assert auto.is_photograph(picture, flat=True)
     drawing = load(
         np.pad(np.full((60, 80, 3), 0.3, np.float32), ((99, 99), (99, 99), (0, 0)), constant_values=0.8)
     )
-    assert not auto.is_photograph(drawing)
+    assert not auto.is_photograph(drawing, flat=True)
     monkeypatch.setattr(auto, "Drawing", lambda *given: pytest.fail("looked for a drawing"))
     fitted(picture, preset="fast", kind="circle", max_falloff=0.0, share=by_count(5))
     assert fitted(picture, preset="fast", kind="circle", max_shapes=5).scene.shape_count == 5
