@@ -37,6 +37,8 @@ CPU = Backend(
     "cpu",
     fused.composite,
     {
+        "l1": deferred("sdf2vec.fit.differences", "Absolute"),
+        "mse": deferred("sdf2vec.fit.differences", "Squared"),
         "ssim": deferred("sdf2vec.fit.ssim", "Dissimilarity"),
         "flip": deferred("sdf2vec.fit.flip", "Flip"),
     },

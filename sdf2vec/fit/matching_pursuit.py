@@ -7,27 +7,33 @@ where they hide.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from bisect import bisect_right
+from collections.abc import Iterator, Sequence
 from functools import lru_cache
-from itertools import chain, islice, repeat
+from itertools import accumulate, chain, islice, repeat
 from typing import NamedTuple
 
 import torch
 
-ROUNDS = 4  # the residual is looked at anew so many times, more often where not all discs find room
+from ..banded import Band
+
+ROUNDS = 2  # the residual is looked at anew so many times, more often where not all discs find room
 SCALE = 1.4  # from one size of disc to the next
 SMALLEST_RADIUS, LARGEST_RADIUS = (
     0.8,
     0.3,
 )  # of a disc: pixels; shares of the square root of the picture's area
 WIDTH = 0.6  # standard deviation of the Gaussian that stands for a disc of radius 1
-FARTHEST = 6.0  # standard deviations: a Gaussian is cut off there, as numbers next to 0 slow processors down
+FARTHEST = 4.0  # standard deviations: a Gaussian is cut off there
+SPACING = 1.0 / 3.0  # of a radius, at most, between places of discs, where that is more than a pixel
 DISC = 0.7  # amount of a disc in that of the Gaussian which fits it best: 1 / (2 − 2·exp(−u)), u = 1.256
 TINY = 1e-9
 LEAST = 1e-5  # mean squared error, below one level of 255: no reason to paint, and above what rounding makes
 APART = 1.5  # radii around a disc where none is put in the same round
 
-Radii = tuple[float, ...]
+Response = tuple[
+    torch.Tensor, torch.Tensor
+]  # at the places of a size [h, w]: amounts or colours [C, h, w], gains
 
 
 class Discs(NamedTuple):
@@ -51,13 +57,13 @@ class Missing(NamedTuple):
     residual: torch.Tensor
     weights: torch.Tensor
 
-    def responses(self, radii: Radii) -> tuple[torch.Tensor, torch.Tensor]:
-        """For a disc of every size at every pixel, the best amount [S, C, H, W] and what it gains [S, H, W]."""
+    def responses(self, sizes: Sequence[Size]) -> Iterator[Response]:
+        """For a disc of every size, the best amount at each of its places, and what it gains."""
         matters = self.weights.square()
-        fitted = _blurred(self.residual * matters, radii)
-        energy = _blurred(matters[None], _squared(radii)).clamp_min(TINY)
-        gains = (fitted.square() / energy).sum(1)
-        return fitted / energy, gains
+        fit, weigh = Blurring.of(self.residual * matters), Blurring.of(matters[None])
+        for size in sizes:
+            fitted, energy = fit.by(size.once), weigh.by(size.twice).clamp_min(TINY)
+            yield fitted / energy, (fitted.square() / energy).sum(0)
 
     def apply(self, window: torch.Tensor, color: torch.Tensor) -> None:
         self.residual.sub_(color[:, None, None] * window)
@@ -74,8 +80,8 @@ class Painted(NamedTuple):
     target: torch.Tensor
     weights: torch.Tensor
 
-    def responses(self, radii: Radii) -> tuple[torch.Tensor, torch.Tensor]:
-        """For a disc of every size at every pixel, the best colour [S, C, H, W] and what it gains [S, H, W].
+    def responses(self, sizes: Sequence[Size]) -> Iterator[Response]:
+        """For a disc of every size, the best colour at each of its places, and what it gains.
 
         With cover h, image i and residual r, colour c leaves r − h·(c − i) of it: a quadratic in c.
         """
@@ -83,13 +89,14 @@ class Painted(NamedTuple):
         residual = self.target - self.image
         hidden = (residual * self.image * matters).sum(0, keepdim=True)
         lost = (self.image.square() * matters).sum(0, keepdim=True)
-        once = _blurred(torch.cat([residual * matters, hidden]), radii)
-        twice = _blurred(torch.cat([self.image * matters, lost, matters[None]]), _squared(radii))
-        linear, energy = once[:, :-1] + twice[:, :-2], twice[:, -1:].clamp_min(TINY)
-        colors = (linear / energy).clamp(0.0, 1.0)
-        fixed = 2.0 * once[:, -1] + twice[:, -2]
-        gains = (colors * (2.0 * linear - colors * energy)).sum(1) - fixed - LEAST * energy[:, 0]
-        return colors, gains
+        fit = Blurring.of(torch.cat([residual * matters, hidden]))
+        weigh = Blurring.of(torch.cat([self.image * matters, lost, matters[None]]))
+        for size in sizes:
+            once, twice = fit.by(size.once), weigh.by(size.twice)
+            linear, energy = once[:-1] + twice[:-2], twice[-1].clamp_min(TINY)
+            colors = (linear / energy).clamp(0.0, 1.0)
+            fixed = 2.0 * once[-1] + twice[-2]
+            yield colors, (colors * (2.0 * linear - colors * energy)).sum(0) - fixed - LEAST * energy
 
     def apply(self, window: torch.Tensor, color: torch.Tensor) -> None:
         self.image.add_((color[:, None, None] - self.image) * window)
@@ -113,55 +120,133 @@ def find_discs(canvas: Missing | Painted, count: int) -> Discs:
 
     The canvas is changed.
     """
-    height, width = canvas.weights.shape
-    radii = _radii(height, width)
-    found: list[tuple[int, int, int, torch.Tensor]] = []
+    sizes = _sizes(*canvas.weights.shape)
+    found: list[Disc] = []
     for rounds_left in chain(range(ROUNDS, 0, -1), repeat(1)):
         now = math.ceil((count - len(found)) / rounds_left)
-        fresh = list(islice(_round(canvas, radii), now))
+        fresh = list(islice(_round(canvas, sizes), now))
         found += fresh
         if len(found) == count or not fresh:
             break
-    x, y, scale = torch.tensor([disc[:3] for disc in found], dtype=torch.int64).reshape(-1, 3).unbind(1)
-    channels = len(canvas[0])
-    colors = [torch.zeros(0, channels), *(canvas.amount(color)[None] for *_, color in found)]
-    return Discs(torch.stack([x + 0.5, y + 0.5], dim=1), torch.tensor(radii)[scale], torch.cat(colors))
+    centers = torch.tensor([(disc.x + 0.5, disc.y + 0.5) for disc in found]).reshape(-1, 2)
+    colors = [torch.zeros(0, len(canvas[0])), *(canvas.amount(disc.color)[None] for disc in found)]
+    return Discs(centers, torch.tensor([disc.radius for disc in found]), torch.cat(colors))
 
 
-def _round(canvas: Missing | Painted, radii: Radii) -> Iterator[tuple[int, int, int, torch.Tensor]]:
+def _round(canvas: Missing | Painted, sizes: Sequence[Size]) -> Iterator[Disc]:
     """The best discs, put on the canvas one after the other, until their surroundings fill it."""
-    colors, gains = canvas.responses(radii)
+    colors, own = zip(*canvas.responses(sizes), strict=True)
+    gains = torch.cat([each.flatten() for each in own])
+    grids = [
+        part.view_as(each) for part, each in zip(gains.split([e.numel() for e in own]), own, strict=True)
+    ]
+    ends = list(accumulate(grid.numel() for grid in grids))
     while gains.max() > 0:
-        yield _take(canvas, colors, gains, radii)
+        best = int(gains.argmax())
+        index = bisect_right(ends, best)
+        row, column = divmod(best - ends[index] + grids[index].numel(), grids[index].shape[1])
+        size = sizes[index]
+        x, y = size.across.place(column), size.down.place(row)
+        disc = Disc(x, y, size.radius, colors[index][:, row, column].clone())
+        canvas.apply(_cover(disc, *canvas.weights.shape), disc.color)
+        for other, grid in zip(sizes, grids, strict=True):
+            grid[other.down.near(y, size.radius), other.across.near(x, size.radius)] = -1.0
+        yield disc
 
 
-def _radii(height: int, width: int) -> Radii:
-    longest = LARGEST_RADIUS * math.sqrt(height * width)
-    steps = math.floor(math.log(max(longest / SMALLEST_RADIUS, 1.0)) / math.log(SCALE)) + 1
-    return tuple(SMALLEST_RADIUS * SCALE**step for step in range(steps))
+# --- Gaussians ----------------------------------------------------------------------------------------------
 
 
-def _squared(radii: Radii) -> Radii:
-    """Of Gaussians that are the squares of those."""
-    return tuple(radius / math.sqrt(2.0) for radius in radii)
+class Disc(NamedTuple):
+    """At the middle of a pixel."""
+
+    x: int
+    y: int
+    radius: float
+    color: torch.Tensor  # [C]
 
 
-def _blurred(image: torch.Tensor, radii: Radii) -> torch.Tensor:
-    """An image [C, H, W] times the Gaussian of every size at every pixel, summed, [S, C, H, W].
+class Axis(NamedTuple):
+    """Which pixels along one side have a disc at their middle: every so many-th."""
 
-    A Gaussian is a product, so two small matrices blur.
-    """
-    channels, height, width = image.shape
-    down, across = _windows(height, radii), _windows(width, radii)
-    columns = down.flatten(0, 1) @ image.transpose(0, 1).flatten(1)
-    return (columns.view(len(radii), -1, width) @ across).view(-1, height, channels, width).transpose(1, 2)
+    start: int
+    step: int
+    side: int
+
+    @classmethod
+    def of(cls, side: int, step: int) -> Axis:
+        """As many before the first as behind the last, about; one, at least."""
+        return cls(min(step, side) // 2, step, side)
+
+    @property
+    def pixels(self) -> torch.Tensor:
+        """All of them."""
+        return torch.arange(self.start, self.side, self.step)
+
+    def place(self, index: int) -> int:
+        """The pixel of the disc of this number."""
+        return self.start + self.step * index
+
+    def near(self, pixel: int, radius: float) -> slice:
+        """Which discs are in the surroundings of one of some radius."""
+        reach = math.ceil(APART * radius)
+        first, last = pixel - reach - self.start, pixel + reach - self.start
+        return slice(max(0, -(-first // self.step)), max(0, last // self.step + 1))
+
+    def gaussians(self, radius: float) -> Band:
+        """That of each disc at every pixel, [discs, side]."""
+        return Band.of(_window(torch.arange(self.side) - self.pixels[:, None], radius))
+
+
+class Size(NamedTuple):
+    """Discs of one radius in pixels: where they are down and across; their Gaussians so, and these squared."""
+
+    radius: float
+    down: Axis
+    across: Axis
+    once: tuple[Band, Band]
+    twice: tuple[Band, Band]
+
+    @classmethod
+    def of(cls, radius: float, height: int, width: int) -> Size:
+        """For a picture of so many pixels."""
+        step = max(1, math.floor(SPACING * radius))
+        down, across = Axis.of(height, step), Axis.of(width, step)
+        once, twice = (
+            (down.gaussians(own), across.gaussians(own)) for own in (radius, radius / math.sqrt(2.0))
+        )
+        return cls(radius, down, across, once, twice)
+
+
+class Blurring(NamedTuple):
+    """An image [C, H, W], as rows of all channels [H, C · W]."""
+
+    rows: torch.Tensor
+    channels: int
+
+    @classmethod
+    def of(cls, image: torch.Tensor) -> Blurring:
+        """Ready to be blurred."""
+        return cls(image.transpose(0, 1).flatten(1), len(image))
+
+    def by(self, gaussians: tuple[Band, Band]) -> torch.Tensor:
+        """Times the Gaussian at each of its places, summed, [C, h, w].
+
+        A Gaussian is a product, so two banded matrices blur.
+        """
+        down, across = gaussians
+        columns = (down @ self.rows).unflatten(1, (self.channels, -1)).flatten(0, 1)
+        rows = (across @ columns.mT).mT
+        blurred: torch.Tensor = rows.unflatten(0, (-1, self.channels)).transpose(0, 1)
+        return blurred
 
 
 @lru_cache(maxsize=8)
-def _windows(side: int, radii: Radii) -> torch.Tensor:
-    """For each size the Gaussian of every place at every other [S, side, side]."""
-    places = torch.arange(side)
-    return torch.stack([_window(places[:, None] - places, radius) for radius in radii])
+def _sizes(height: int, width: int) -> Sequence[Size]:
+    """Of discs that are looked for in a picture."""
+    longest = LARGEST_RADIUS * math.sqrt(height * width)
+    steps = math.floor(math.log(max(longest / SMALLEST_RADIUS, 1.0)) / math.log(SCALE)) + 1
+    return [Size.of(SMALLEST_RADIUS * SCALE**step, height, width) for step in range(steps)]
 
 
 def _window(offsets: torch.Tensor, radius: float) -> torch.Tensor:
@@ -169,16 +254,9 @@ def _window(offsets: torch.Tensor, radius: float) -> torch.Tensor:
     return torch.where(z.abs() < FARTHEST, torch.exp(-0.5 * z.square()), 0.0)
 
 
-def _take(
-    canvas: Missing | Painted, colors: torch.Tensor, gains: torch.Tensor, radii: Radii
-) -> tuple[int, int, int, torch.Tensor]:
-    """The best disc (x, y, index of its radius, colour); puts it on the canvas and bars its surroundings."""
-    _, height, width = gains.shape
-    best = int(gains.argmax())
-    scale, y, x = best // (height * width), best // width % height, best % width
-    color, radius = colors[scale, :, y, x].clone(), radii[scale]
-    down, across = (_window(torch.arange(side) - at, radius) for side, at in ((height, y), (width, x)))
-    canvas.apply(down[:, None] * across, color)
-    reach = math.ceil(APART * radius)
-    gains[:, max(0, y - reach) : y + reach + 1, max(0, x - reach) : x + reach + 1] = -1.0
-    return x, y, scale, color
+def _cover(disc: Disc, height: int, width: int) -> torch.Tensor:
+    """How much of each pixel the Gaussian covers that stands for a disc, [H, W]."""
+    down, across = (
+        _window(torch.arange(side) - at, disc.radius) for side, at in ((height, disc.y), (width, disc.x))
+    )
+    return down[:, None] * across

@@ -6,18 +6,18 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache
-from typing import Any, NamedTuple
+from typing import Any
 
 import torch
 from torch.autograd.function import once_differentiable
 
+from ..banded import Band, with_transposed
 from .draw import composer
 from .tensors import Group, SceneTensors
 
 REACH = 3.5  # standard deviations that a blur reaches
 NONE = 0.5  # pixels: a run of a smaller standard deviation is not blurred
 FINENESS = 1.5  # samples in a standard deviation, at least, where they are wider than pixels
-BLOCK = 32  # rows of a banded matrix that are multiplied at once
 ALPHA = 3  # place of alpha among the channels
 
 
@@ -106,11 +106,11 @@ class _Canvas:
         return made
 
     @lru_cache(maxsize=8)  # noqa: B019 (canvases are equal and few)
-    def bands(self, variance: float) -> tuple[_Band, _Band]:
+    def bands(self, variance: float) -> tuple[Band, Band]:
         """What blurs down and across; variance in pixels squared."""
         return (
-            _Band.of(self._weights(self.height, self.rows, variance)),
-            _Band.of(self._weights(self.width, self.columns, variance)),
+            with_transposed(self._weights(self.height, self.rows, variance)),
+            with_transposed(self._weights(self.width, self.columns, variance)),
         )
 
     def _weights(self, pixels: int, samples: int, variance: float) -> torch.Tensor:
@@ -121,35 +121,6 @@ class _Canvas:
         # numbers next to nothing take processors long
         weights = torch.where(squared < REACH**2, (-0.5 * squared.clamp(max=REACH**2)).exp(), 0.0)
         return weights / weights.sum(1, keepdim=True)
-
-
-class _Band(NamedTuple):
-    """A matrix [N, M] with few numbers but 0 in a row, near its diagonal: for each BLOCK of its rows those columns that
-    are not 0, and which they are.
-    """
-
-    blocks: tuple[tuple[torch.Tensor, int, int], ...]
-    transposed: _Band | None = None
-
-    @classmethod
-    def of(cls, matrix: torch.Tensor) -> _Band:
-        """With its transposed."""
-        return cls(_blocks(matrix), cls(_blocks(matrix.T)))
-
-    def __matmul__(self, image: torch.Tensor) -> torch.Tensor:
-        """Times an image [C, M, W]: [C, N, W]."""
-        return torch.cat([block @ image[:, low:high] for block, low, high in self.blocks], dim=1)
-
-
-def _blocks(matrix: torch.Tensor) -> tuple[tuple[torch.Tensor, int, int], ...]:
-    used = (matrix != 0).byte()
-    lows, behind = used.argmax(1).tolist(), used.flip(1).argmax(1).tolist()
-    found = []
-    for first in range(0, len(matrix), BLOCK):
-        rows = slice(first, first + BLOCK)
-        low, high = min(lows[rows]), matrix.shape[1] - min(behind[rows])
-        found.append((matrix[rows, low:high].contiguous(), low, high))
-    return tuple(found)
 
 
 class _Blur(torch.autograd.Function):

@@ -11,7 +11,7 @@ from sdf2vec.fit.adam import Adam, adam_over
 from sdf2vec.fit.growth import densify, exchange, importance, prune
 from sdf2vec.fit.initialization import Layers, Places, empty_groups, groups_at
 from sdf2vec.fit.loop import Fit
-from sdf2vec.fit.matching_pursuit import WIDTH, Missing, Painted, find_discs
+from sdf2vec.fit.matching_pursuit import WIDTH, Missing, Painted, Size, find_discs
 from sdf2vec.fit.presets import PRESETS, Growth, Phase, Preset, Relocation
 from sdf2vec.fit.settings import settings_of
 from sdf2vec.image import Picture, load, resize
@@ -219,17 +219,26 @@ def missing(residual: torch.Tensor) -> Missing:
 
 @pytest.mark.parametrize("radius", [0.8 * 1.4**3, 0.8 * 1.4**6])
 def test_pursuit_finds_a_blob(radius):
-    found = find_discs(missing(blob(20.5, 24.5, radius, [0.5, -0.25, 0.125])), 1)
-    assert found.centers.tolist() == [[20.5, 24.5]]
+    found = find_discs(missing(blob(21.5, 25.5, radius, [0.5, -0.25, 0.125])), 1)
+    assert found.centers.tolist() == [[21.5, 25.5]]
     assert float(found.radii[0]) == pytest.approx(radius, rel=1e-5)
     assert found.colors[0].tolist() == pytest.approx([0.35, -0.175, 0.0875], rel=0.02)  # of a disc: 0.7
 
 
+@pytest.mark.parametrize("radius", [0.8 * 1.4**3, 0.8 * 1.4**6, 0.8 * 1.4**8])
+@pytest.mark.parametrize("x", [20.5, 21.5, 22.5, 23.5])
+def test_pursuit_finds_a_blob_between_the_places_where_it_looks(radius, x):
+    """They are at most a third of a radius apart."""
+    found = find_discs(missing(blob(x, 19.5, radius, [0.5, -0.25, 0.125])), 1)
+    assert (found.centers - torch.tensor([x, 19.5])).abs().max() <= max(0.0, radius / 6)
+    assert float(found.radii[0]) == pytest.approx(radius, rel=1e-5)
+
+
 @pytest.mark.parametrize("radius", [3.0, 5.0, 9.0])
 def test_pursuit_finds_a_disc(radius):
-    disc = (blob(20.5, 18.5, 1, [1.0]) > math.exp(-(radius**2) / (2 * WIDTH**2))).float()
+    disc = (blob(21.5, 19.5, 1, [1.0]) > math.exp(-(radius**2) / (2 * WIDTH**2))).float()
     found = find_discs(missing(disc * torch.tensor([0.4, -0.2, 0.1])[:, None, None]), 1)
-    assert (found.centers - torch.tensor([20.5, 18.5])).abs().max() <= 1
+    assert (found.centers - torch.tensor([21.5, 19.5])).abs().max() <= 1
     assert radius / 1.25 < float(found.radii[0]) < radius * 1.25
     assert found.colors[0].tolist() == pytest.approx([0.4, -0.2, 0.1], rel=0.15)
 
@@ -272,18 +281,25 @@ def test_what_is_painted_gains_what_it_should_and_no_other_color_gains_more(weig
     noise = 0.4 + 0.2 * torch.rand((2, 3, 30, 24), generator=seeded())
     weights = torch.rand((30, 24), generator=seeded(1)) if weighted else torch.ones(30, 24)
     canvas = Painted(noise[0], noise[1], weights)
-    radii = (1.0, 4.0)
-    colors, gains = canvas.responses(radii)
+    radii, x, y = (1.0, 7.0), 11, 13
+    sizes = [Size.of(radius, 30, 24) for radius in radii]
+    responses = list(canvas.responses(sizes))
 
     def gain(color: torch.Tensor, index: int) -> float:
-        cover = blob(11.5, 14.5, radii[index], [1.0], 24, 30)
+        cover = blob(x + 0.5, y + 0.5, radii[index], [1.0], 24, 30)
         painted = noise[0] + cover * (color[:, None, None] - noise[0])
         before, after = (((image - noise[1]) * weights).square().sum() for image in (noise[0], painted))
         return float(before - after)
 
-    for index in range(2):
-        best = colors[index, :, 14, 11]
-        assert float(gains[index, 14, 11]) == pytest.approx(gain(best, index), abs=1e-3)
+    for index, (size, (colors, gains)) in enumerate(zip(sizes, responses, strict=True)):
+        place = next(
+            (row, column)
+            for row in range(gains.shape[0])
+            for column in range(gains.shape[1])
+            if (size.down.place(row), size.across.place(column)) == (y, x)
+        )
+        best = colors[(slice(None), *place)]
+        assert float(gains[place]) == pytest.approx(gain(best, index), abs=1e-3)
         for change in torch.eye(3) * 0.02:
             assert max(gain(best + change, index), gain(best - change, index)) < gain(best, index)
 
