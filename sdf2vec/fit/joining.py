@@ -242,9 +242,14 @@ class Search:
         fewer = (Tried(less, around.error(less)) for less in reductions(tried.layer))
         return [*worth.best(kinds)[:FINALISTS], *worth.best(fewer)[:1]]
 
-    def filled(self, place: Opening, around: Surroundings, finer: Surroundings) -> Tried | None:
-        """The layer with the best shape in an opening, refined in finer surroundings; None where nothing is wanted."""
-        tried = (self.refined(likely.layer, finer) for likely in self.likely(place, around))
+    def filled(
+        self, place: Opening, around: Surroundings, finer: Surroundings, worst: float = math.inf
+    ) -> Tried | None:
+        """The layer with the best shape in an opening, refined in finer surroundings; None where nothing is wanted, or
+        where no shape promises an error below the worst.
+        """
+        hopeful = (likely for likely in self.likely(place, around) if likely.error < worst)
+        tried = (self.refined(likely.layer, finer) for likely in hopeful)
         return min(tried, key=lambda found: found.error, default=None)
 
     def likely(self, place: Opening, around: Surroundings) -> list[Tried]:

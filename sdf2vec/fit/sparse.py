@@ -44,6 +44,9 @@ PATIENCE, CLOSE = 2, 10**-3.9  # rounds; mean squared error, 39 dB, below which 
 NEEDLESS = 1.05  # how much the error may rise by a layer taken out, after a descent
 THROUGH = 0.1  # of the error that a cut could take away where the picture is transparent, at least, for a try
 WORST = 0.1  # of all that is wrong, where a layer is whose shapes are exchanged
+PROMISING = (
+    3.0  # times the error before, of another shape in the place of one while the others are as they were
+)
 RETHOUGHT = 2  # colours whose layers are found anew in a round, at most
 
 
@@ -289,7 +292,8 @@ def _exchanged(scene: SceneTensors, sizes: Sizes, search: Search) -> SceneTensor
         coarse, fine = (Surroundings.of(scene, order, view) for view in (sizes.search, sizes.joint))
         for index in range(len(layer_at(scene, order).structure)):
             layer = layer_at(scene, order)
-            best = search.filled(in_place_of(layer, index, coarse), coarse, fine)
+            promised = PROMISING * coarse.error(layer)
+            best = search.filled(in_place_of(layer, index, coarse), coarse, fine, promised)
             if best and best.error < MOVED * fine.error(layer):
                 scene = inserted(scene, best.layer)
     return descended(scene, sizes.joint, search, AFTER)

@@ -17,7 +17,8 @@ from ..render.tensors import Group, SceneTensors
 from .laying import Laid
 from .levenberg import Dense, Problem
 
-MOST_COMPILED = 6  # shapes in a layer: of more there are too many structures to compile kernels for
+# shapes in a layer, and points: there are too many structures of more shapes to compile kernels for a look at less
+MOST_COMPILED, GLANCE = 6, 2500
 
 Points = tuple[torch.Tensor, torch.Tensor, torch.Tensor]  # x [P], y [P], size of a pixel []
 
@@ -95,7 +96,7 @@ class Surroundings:
         """What is wrong with layers of a structure in the place of this one, weighted; `counts` [G, P]: by how much
         each point counts for each of them.
         """
-        if len(structure) > MOST_COMPILED:
+        if len(structure) > MOST_COMPILED and len(self.weights) < GLANCE:
             weights = 1.0 if counts is None else counts[:, None]
             return Dense(lambda rows: self._wrong_at(structure, rows) * weights, len(self.weights))
         weights = self.weights[None] if counts is None else self.weights * counts

@@ -9,9 +9,10 @@ import pytest
 import torch
 
 from sdf2vec.fit import surroundings
+from sdf2vec.fit.laying import Laid
 from sdf2vec.fit.levenberg import Dense, Numbers, descend
 from sdf2vec.fit.regions import ellipses, strokes
-from sdf2vec.fit.surroundings import MOST_COMPILED, Surroundings, View
+from sdf2vec.fit.surroundings import GLANCE, MOST_COMPILED, Surroundings, View
 from sdf2vec.layer import Part, row_width
 from sdf2vec.render.tensors import from_scene
 from sdf2vec.scene import Layer, Scene, Shape
@@ -86,6 +87,16 @@ STRUCTURES = [
 ]
 
 
+@pytest.mark.parametrize("parts", [MOST_COMPILED, MOST_COMPILED + 1])
+@pytest.mark.parametrize("side", [40, 56])
+def test_kernels_are_compiled_but_for_a_glance_at_many_shapes(parts, side):
+    scene = from_scene(Scene(side, side, (Layer((Shape("circle", (0, 0, 0.3), (1, 0, 0)),), 0.1),)))
+    around = Surroundings.of(scene, 0, View(torch.zeros(3, side, side), None))
+    structure = (Part("circle"), *[Part("box", join="subtraction")] * (parts - 1))
+    is_glance = side * side < GLANCE and parts > MOST_COMPILED
+    assert isinstance(around.problem(structure), Dense if is_glance else Laid)
+
+
 @pytest.mark.parametrize("structure", STRUCTURES, ids=lambda parts: "-".join(part.kind for part in parts))
 @pytest.mark.parametrize("channels", [3, 4])
 @pytest.mark.parametrize("counted", [False, True])
@@ -100,10 +111,11 @@ def test_normal_equations_of_kernels_are_those_of_autograd(structure, channels, 
     rows = 0.05 + 0.3 * torch.rand(5, row_width(structure), generator=draw)
     counts = torch.rand(5, 50 * 61, generator=draw) if counted else None
     free = torch.tensor([number for number in range(rows.shape[1]) if number != 2])
-    assert len(structure) <= MOST_COMPILED
     kernels = around.problem(structure, counts)
     monkeypatch.setattr(surroundings, "MOST_COMPILED", 0)
+    monkeypatch.setattr(surroundings, "GLANCE", 10**6)
     autograd = around.problem(structure, counts)
+    assert (type(kernels), type(autograd)) == (Laid, Dense)
     assert kernels.errors(rows).numpy() == pytest.approx(autograd.errors(rows).numpy(), rel=1e-5)
     for found, wanted in zip(kernels.normal(rows, free), autograd.normal(rows, free), strict=True):
         assert found.numpy() == pytest.approx(wanted.numpy(), rel=1e-3, abs=1e-5 * float(wanted.abs().max()))

@@ -10,10 +10,11 @@ import torch
 
 import sdf2vec
 from sdf2vec.fit import joining
+from sdf2vec.fit.candidates import cut_from
 from sdf2vec.fit.initialization import Layers
 from sdf2vec.fit.loop import fit_picture
 from sdf2vec.fit.settings import Settings, settings_of
-from sdf2vec.fit.surroundings import View
+from sdf2vec.fit.surroundings import Surroundings, View, layer_at
 from sdf2vec.fit.views import scaled
 from sdf2vec.image import Picture
 from sdf2vec.metrics import psnr
@@ -68,6 +69,25 @@ def joined(pixels, kinds, scene=None, seed=0, most=3):
     *_, tensors = joining.join(tensors, [View(size, None) for size in sizes], search, most)
     found = to_scene(tensors, SIDE, SIDE)
     return found, float(psnr(render(found)[:3], target))
+
+
+def test_what_promises_too_little_is_not_refined():
+    """A hole in a disc: its error falls far below what the disc's was, so a bound just above that refines it."""
+    target = torch.from_numpy(np.ascontiguousarray(PICTURES["ring"].transpose(2, 0, 1)))
+    search = joining.Search(
+        Layers(("circle",), "over"),
+        (0.0, 1.5),
+        torch.Generator().manual_seed(0),
+        lambda error: None,
+        1.0 / SIDE,
+    )
+    around = Surroundings.of(from_scene(started()), 0, View(target, None))
+    disc = search.refined(layer_at(from_scene(started()), 0), around)
+    opening = cut_from(disc.layer, around)
+    found = search.filled(opening, around, around, disc.error)
+    assert found is not None
+    assert found.error < disc.error
+    assert search.filled(opening, around, around, 1e-9 * disc.error) is None
 
 
 @pytest.mark.parametrize(("name", "kind"), [("ring", "circle"), ("frame", "box")])
