@@ -68,6 +68,22 @@ def test_what_a_backend_computes_faster_is_the_same_loss(loss):
     assert float((fast - exact).abs().max()) <= 1e-3 * float(exact.abs().max())
 
 
+@pytest.mark.parametrize(("loss", "power"), [("l1", 1), ("mse", 2)])
+@pytest.mark.parametrize("channels", [3, 4])
+def test_fast_differences_are_those_on_black_and_on_white(loss, power, channels):
+    """Written out anew, in float64; more rows than a thread takes at a time."""
+    render, target = torch.rand(2, channels, 45, 23, generator=torch.Generator().manual_seed(0))
+    double = render.double().requires_grad_()
+    wrong = double - target
+    grounds = [wrong[:3]] if channels == 3 else [wrong[:3], wrong[:3] - wrong[3]]
+    value = torch.stack(grounds).abs().pow(power).mean()
+    (exact,) = torch.autograd.grad(value, double)
+    found = backends.CPU.losses[loss](target)(render.requires_grad_())
+    (fast,) = torch.autograd.grad(found, render)
+    assert found.item() == pytest.approx(value.item(), rel=1e-6)
+    assert fast.numpy() == pytest.approx(exact.numpy(), rel=1e-4, abs=1e-9)
+
+
 def test_a_backends_losses_take_the_place_of_those_of_their_names():
     target = as_tensor(picture())
     found = losses.objective(
