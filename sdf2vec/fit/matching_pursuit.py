@@ -141,8 +141,7 @@ def _round(canvas: Missing | Painted, sizes: Sequence[Size]) -> Iterator[Disc]:
         part.view_as(each) for part, each in zip(gains.split([e.numel() for e in own]), own, strict=True)
     ]
     ends = list(accumulate(grid.numel() for grid in grids))
-    while gains.max() > 0:
-        best = int(gains.argmax())
+    while gains[best := int(gains.argmax())] > 0:
         index = bisect_right(ends, best)
         row, column = divmod(best - ends[index] + grids[index].numel(), grids[index].shape[1])
         size = sizes[index]

@@ -230,7 +230,7 @@ def test_pursuit_finds_a_blob(radius):
 def test_pursuit_finds_a_blob_between_the_places_where_it_looks(radius, x):
     """They are at most a third of a radius apart."""
     found = find_discs(missing(blob(x, 19.5, radius, [0.5, -0.25, 0.125])), 1)
-    assert (found.centers - torch.tensor([x, 19.5])).abs().max() <= max(0.0, radius / 6)
+    assert (found.centers - torch.tensor([x, 19.5])).abs().max() <= radius / 6
     assert float(found.radii[0]) == pytest.approx(radius, rel=1e-5)
 
 
