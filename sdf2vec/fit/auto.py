@@ -34,7 +34,19 @@ from .one_more import gain_of_one_more
 from .ramps import grounded
 from .settings import AUTO, Settings, preset_of
 from .simplify import sharing, simplified
-from .sparse import FLOOR, THOROUGH, USUAL, Round, Sizes, error_of, finished, grow, needed, pruned
+from .sparse import (
+    FLOOR,
+    THOROUGH,
+    USUAL,
+    Round,
+    Sizes,
+    error_of,
+    finished,
+    grow,
+    needed,
+    pruned,
+    taken_apart,
+)
 from .surroundings import View
 from .targets import meeting, missed, wanted
 from .views import scaled, view_of
@@ -248,6 +260,8 @@ class Drawing:
         try:
             self._announce_compiling()
             self.scene = grounded(self.scene, self.sizes.joint, self.search)
+            if not self.scene.groups:
+                self.scene = taken_apart(self.scene, self.sizes, self.search, self.settings.most)
             for made in grow(self.scene, self.sizes, self.search, self.settings.most, self.floor):
                 if self._is_no_drawing(made):
                     self.gave_up = not self._was_good(made)

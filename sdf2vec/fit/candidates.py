@@ -9,7 +9,7 @@ their own.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cache
 from typing import Any, NamedTuple
 
@@ -37,6 +37,7 @@ BLURS, STEPS = (3.0, 1.0), 4  # sizes of a pixel in pixels, one after the other;
 START_SMOOTHNESS = 0.003  # scene units
 EAGER = 0.25  # how much an error matters where a first shape is not wanted: what is too much can be cut out
 LONGER = 1.2  # than wide: most kinds of shape at their start
+SHARP_AND_WHITE = {OPACITY: 1.0, FALLOFF: 0.0, COLOR: 1.0}
 FAINT = 1e-8  # of a squared change of the picture
 
 
@@ -167,7 +168,7 @@ def alone(order: torch.Tensor, color: torch.Tensor, falloff: float, around: Surr
 
 
 def _opening(layer: Group, index: int, join: str, color: torch.Tensor, around: Surroundings) -> Opening:
-    covers = [_own_cover(layer, part, around) for part in range(len(layer.structure))]
+    covers = [own_cover(layer, part, around) for part in range(len(layer.structure))]
     joins = [part.join for part in layer.structure]
     nothing, everything = (torch.full_like(around.points[0], end) for end in (0.0, 1.0))
     ends = [
@@ -187,7 +188,7 @@ def _mask(low: torch.Tensor, high: torch.Tensor) -> Mask:
     return Mask(strength, amount, float((low.square().mean(0) - amount.square()).mean()))
 
 
-def _own_cover(layer: Group, index: int, around: Surroundings) -> torch.Tensor:
+def own_cover(layer: Group, index: int, around: Surroundings) -> torch.Tensor:
     """Coverage [P] of one part of a layer alone."""
     structure = (Part(layer.structure[index].kind),)
     columns = [
@@ -264,6 +265,23 @@ class Proposer:
             for index, row in zip(spread, rows, strict=True)
         ]
 
+    def sharpened(self, layer: Group, mask: Mask, around: Surroundings, steps: int) -> Group:
+        """A layer after some steps of its outline towards a mask."""
+        structure = layer.structure
+        every = slots(structure)
+        values = [
+            torch.full_like(layer.values[slot], SHARP_AND_WHITE[slot.parameter.unit])
+            if slot.parameter.unit in SHARP_AND_WHITE
+            else layer.values[slot]
+            for slot in every
+        ]
+        rows, numbers = torch.cat(values, dim=1), self.numbers(structure, _is_geometry)
+        for blur in BLURS:
+            rows, _ = descend(rows, _misses(structure, [mask], around, blur), numbers, steps, self.tick)
+        moved = zip(every, rows.split([slot.parameter.width for slot in every], dim=1), strict=True)
+        outline = {slot: tensor for slot, tensor in moved if _is_geometry(slot)}
+        return replace(layer, values={**layer.values, **outline})
+
     def _fitted(
         self, kind: str, masks: Sequence[Mask], starts: Sequence[Placed], around: Surroundings
     ) -> list[tuple[torch.Tensor, float]]:
@@ -299,11 +317,10 @@ class Proposer:
 
     def placed(self, gain: torch.Tensor, around: Surroundings) -> Placed:
         """Where shapes start: along each region of what is wanted [P], the other way round, and turned at random."""
-        height, width = around.shape
-        found = torch.tensor(ellipses_of(gain.reshape(height, width).numpy())).reshape(-1, 5)
-        size = torch.tensor(around.scene.size)
-        centers = (found[:, :2] / torch.tensor([width, height]) - 0.5) * size
-        sizes = (found[:, 2] * found[:, 3]).sqrt() * (around.scene.size[0] / width)
+        x, y, pixel = around.points
+        found = torch.tensor(ellipses_of(gain.reshape(around.shape).numpy())).reshape(-1, 5)
+        centers = torch.stack([x[0], y[0]]) + (found[:, :2] - 0.5) * pixel
+        sizes = (found[:, 2] * found[:, 3]).sqrt() * pixel
         longer = (found[:, 2] / found[:, 3]).sqrt() / LONGER**0.5
         stretches = torch.stack([longer, 1.0 / longer], dim=1)
         turns = torch.rand(len(found), generator=self.generator) * 2 * torch.pi
@@ -336,8 +353,8 @@ def _rows(structure: Structure, placed: Placed) -> torch.Tensor:
     """Sharp opaque layers of one white shape at some places, [N, U]."""
     count = len(placed.sizes)
     looks = {
-        unit.name: torch.full((count, width), value)
-        for unit, width, value in ((OPACITY, 1, 1.0), (FALLOFF, 1, 0.0), (COLOR, 3, 1.0))
+        unit.name: torch.full((count, width), SHARP_AND_WHITE[unit])
+        for unit, width in ((OPACITY, 1), (FALLOFF, 1), (COLOR, 3))
     }
     return torch.cat([start_of(slot.parameter, placed, looks) for slot in slots(structure)], dim=1)
 

@@ -77,7 +77,7 @@ class Region:
     def of(cls, opening: Opening, around: Surroundings) -> Region:
         """Where the picture has about the opening's colour; where it nowhere has, wherever the colour helps."""
         height, width = around.shape
-        colors = straight(around.target.flatten(1).T)[:, :3]
+        colors = straight(around.shown().T)[:, :3]
         near = (colors - opening.color).square().sum(1) < NEAR
         near = near if bool((opening.mask.gain.clamp_min(0.0) * near).any()) else torch.ones_like(near)
         beside = max_pool2d(near.reshape(1, 1, height, width).float(), 3, 1, 1).flatten() > 0
@@ -381,7 +381,7 @@ def _likeness(one: torch.Tensor, other: torch.Tensor) -> float:
 def missing_colors(around: Surroundings) -> list[torch.Tensor]:
     """The straight colours [1, 3] of the picture where most is missing, the worst first."""
     wrong = around.residual().square().sum(0).flatten()
-    colors = straight(around.target.flatten(1).T)
+    colors = straight(around.shown().T)
     if len(around.target) == 4:
         wrong = wrong * (colors[:, 3] > 0.5)
     colors, left, found = colors[:, :3], wrong.clone(), []

@@ -25,6 +25,7 @@ from .constraints import enforce_min_thickness, project
 from .joining import Search, detached, faults_of, inserted
 from .least_squares import count_numbers, improved
 from .offers import NEAR, Offer, choices, instead_of, offers
+from .peeling import peeled
 from .presets import Phase
 from .ramps import lowest
 from .surroundings import Surroundings, View, layer_at, points_of, residual_of, some
@@ -50,8 +51,7 @@ PROMISING = (
 RETHOUGHT = 2  # colours whose layers are found anew in a round, at most
 
 
-@dataclass(frozen=True)
-class Sizes:
+class Sizes(NamedTuple):
     """The picture at the sizes that are looked at: where shapes are searched, where all descend, at the end."""
 
     search: View
@@ -127,6 +127,18 @@ def _alternatives(
     if 0 < scene.layer_count <= FEW:
         yield _carved(scene, sizes, search, floor)
         yield _exchanged(scene, sizes, search)
+
+
+def taken_apart(scene: SceneTensors, sizes: Sizes, search: Search, most: int) -> SceneTensors:
+    """The bare scene with the layers that can be told by their outlines, after a descent of all, if that helps; as it
+    is where they are more than `most`.
+    """
+    made = peeled(scene, sizes, search)
+    if not 0 < made.layer_count <= most:
+        return scene
+    for _ in range(2):
+        made = descended(made, sizes.joint, search, JOINT)
+    return min(scene, made, key=partial(error_of, view=sizes.joint))
 
 
 def finished(scene: SceneTensors, sizes: Sizes, search: Search) -> SceneTensors:

@@ -20,6 +20,8 @@ from .levenberg import Dense, Problem
 # shapes in a layer, and points: there are too many structures of more shapes to compile kernels for a look at less
 MOST_COMPILED, GLANCE = 6, 2500
 
+SEEN = 0.2  # of what is below, at least, where its colour is told from what is shown
+
 Points = tuple[torch.Tensor, torch.Tensor, torch.Tensor]  # x [P], y [P], size of a pixel []
 
 
@@ -92,6 +94,20 @@ class Surroundings:
         """Height and width in pixels."""
         return self.target.shape[1], self.target.shape[2]
 
+    def window(self, rows: slice, columns: slice) -> Surroundings:
+        """A part of them."""
+        height, width = self.shape
+
+        def part(values: torch.Tensor) -> torch.Tensor:
+            planes = values.reshape(*values.shape[:-1], height, width)[..., rows, columns]
+            return planes.reshape(*values.shape[:-1], -1)
+
+        x, y, pixel = self.points
+        points = part(x), part(y), pixel
+        weights, below, dark, light = map(part, (self.weights, self.below, self.dark, self.light))
+        target = self.target[:, rows, columns]
+        return Surroundings(points, target, weights, below, dark, light, self.scene)
+
     def problem(self, structure: Structure, counts: torch.Tensor | None = None) -> Problem:
         """What is wrong with layers of a structure in the place of this one, weighted; `counts` [G, P]: by how much
         each point counts for each of them.
@@ -123,6 +139,13 @@ class Surroundings:
     def error(self, layer: Group) -> float:
         """The weighted mean squared error with a layer in the place of this one."""
         return float(self.problem(layer.structure).errors(layer.rows()))
+
+    def shown(self) -> torch.Tensor:
+        """The picture [C, P] as this place should show it: without what lies above, where that lets enough through."""
+        channels, target = len(self.target), self.target.flatten(1)
+        through = (self.light - self.dark)[:channels]
+        below = (target - self.dark[:channels]) / through.clamp_min(SEEN)
+        return torch.where(through > SEEN, below.clamp(0.0, 1.0), target)
 
     def residual(self) -> torch.Tensor:
         """What is missing without the layer, weighted, [C, H, W]."""

@@ -1,0 +1,319 @@
+"""A drawing taken apart from the top: what lies on all else is whole, so its outline is known; then what it lies on.
+
+A translucent layer is told by the colours of the regions that it covers (`transparency`), an opaque one is a region of
+one colour, or all regions of that. If a shape has the same outline, or a shape with another cut out of it, that is
+taken off the picture. What an opaque one hides is not known then: what lies under it may have any outline there.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+import torch
+from scipy import ndimage
+from skimage.morphology import convex_hull_image
+from torch.nn.functional import interpolate
+
+from ..arrays import BoolArray
+from ..blend import SUBTRACTION
+from ..layer import LOOK, Slot, Structure, row_width
+from ..render.reference import rows_coverage
+from ..render.tensors import Group, SceneTensors
+from .candidates import Mask, Opening, Proposer, own_cover
+from .initialization import straight
+from .joining import Search, inserted
+from .region_graph import Regions
+from .surroundings import Surroundings, View
+from .transparency import Overlay, bared, overlays
+
+MOST = 64  # layers that are taken off a picture
+POINTS = 4000  # at most, at which an outline is looked for
+MARGIN = 0.2, 4  # around a region: share of its longer side, and pixels
+STARTS, BASES = 6, 3  # of a kind of shape; shapes from which others are cut
+EXACT = 0.36  # pixels by which an outline is off in the mean, at most
+LEAST_OFF = 0.15  # below that an outline is no better
+GOOD = 0.25  # share of a layer that its shape may miss, at most
+BITTEN = 0.05  # share of what is cut out of a shape that is beyond its edge: a bite, no hole
+PRICE = 0.04  # of a number, in logarithms of what is missed
+EAGER = 0.25  # how much it matters what is covered too much, where it may be cut away
+LIKELY, STEPS = 3, 10  # structures whose outlines are sharpened in the end; steps of each
+HOPEFUL = 3.0  # pixels by which these are off
+TINY = 1e-9
+
+
+@dataclass(frozen=True)
+class Outlined:
+    """A layer of one shape, or of one with another cut out of it, for an overlay.
+
+    `off`: by how many pixels its outline is off, in the mean; `missed`: the share of the overlay that is wrong;
+    `bitten`: whether what is cut out of it goes beyond its edge; `soft`: whether the overlay's edge is.
+    """
+
+    layer: Group
+    overlay: Overlay
+    off: float
+    missed: float
+    bitten: bool
+    soft: bool
+
+    @property
+    def score(self) -> float:
+        """What is the less the better: each number has its price."""
+        return math.log(max(self.off, LEAST_OFF)) + PRICE * row_width(self.layer.structure)
+
+    @property
+    def is_good(self) -> bool:
+        """Whether it has the overlay's outline."""
+        return self.off < EXACT and self.missed < GOOD
+
+    @property
+    def is_joined(self) -> bool:
+        """Whether something is cut out of it."""
+        return len(self.layer.structure) > 1
+
+    @property
+    def rank(self) -> tuple[bool, bool, int, float]:
+        """What is the less the likelier: of translucent layers what explains the most regions is."""
+        opaque = self.overlay.opacity == 1.0
+        return self.bitten, self.is_joined, 0 if opaque else -int(self.overlay.inside.sum()), self.score
+
+    def lies_under(self, other: Outlined) -> bool:
+        """Whether another one shows what is under it where this one is."""
+        return bool((self.overlay.inside & other.overlay.outside).any())
+
+
+@torch.no_grad()
+def peeled(scene: SceneTensors, views: Sequence[View], search: Search) -> SceneTensors:
+    """The scene, which has no layers, with those of a picture that can be told by their outlines.
+
+    What has a soft edge is taken off, too, but it is not kept: of which kind it is, its colours tell better.
+    `views`: the picture at the sizes where outlines are looked for, the largest last.
+    """
+    pixels = views[-1].target.permute(1, 2, 0).numpy().astype(np.float64)
+    regions = Regions.of(pixels)
+    outlines = Outlines(scene, [Surroundings.of(scene, 0, view) for view in views], search)
+    found: list[Group] = []
+    while len(found) < MOST and (top := outlines.topmost(regions)) is not None:
+        found += [] if top.soft else [top.layer]
+        opaque = top.overlay.opacity == 1.0
+        regions = regions.hidden(top.overlay.inside) if opaque else bared(regions, top.overlay)
+    for layer in reversed(found):
+        scene = inserted(scene, replace(layer, order=torch.tensor([scene.layer_count])))
+    return scene
+
+
+@dataclass(frozen=True)
+class Area:
+    """Where an overlay is, [P], and where it is known whether it is, [P], in a window of some surroundings."""
+
+    overlay: Overlay
+    inside: torch.Tensor
+    known: torch.Tensor
+    around: Surroundings
+    soft: bool  # its edge
+
+    @property
+    def key(self) -> tuple[bytes, ...]:
+        """What its outline follows from."""
+        x, y, pixel = self.around.points
+        ends = torch.stack([x[0], y[0], pixel])
+        return tuple(tensor.numpy().tobytes() for tensor in (self.inside, self.known, ends))
+
+    @property
+    def edge(self) -> float:
+        """The length of its outline in pixels."""
+        inside = (self.inside > 0.5).reshape(self.around.shape).numpy()
+        return float(max((inside & ~ndimage.binary_erosion(inside)).sum(), 1))
+
+    def outlined(self, layer: Group) -> Outlined:
+        """How well a layer covers it."""
+        wrong = float((self.cover(layer) * self.known - self.inside).abs().sum())
+        missed = wrong / max(float(self.inside.sum()), TINY)
+        return Outlined(layer, self.overlay, wrong / self.edge, missed, self._is_bitten(layer), self.soft)
+
+    def _is_bitten(self, layer: Group) -> bool:
+        """Whether a shape that is cut out of another goes beyond its edge."""
+        if len(layer.structure) < 2:
+            return False
+        base, cut = (own_cover(layer, index, self.around) for index in (0, 1))
+        return bool((cut * (1.0 - base)).sum() > BITTEN * cut.sum())
+
+    def cover(self, layer: Group) -> torch.Tensor:
+        """Coverage [P] of a layer without its opacity."""
+        rows = layer.rows()[..., None]
+        compositing = self.around.scene.compositing
+        return rows_coverage(layer.structure, rows, compositing, *self.around.points)[0][0]
+
+    def hull(self) -> torch.Tensor:
+        """Where it may be if it is convex: others may hide parts of it, [P]."""
+        around = convex_hull_image((self.inside > 0.5).reshape(self.around.shape).numpy())
+        return torch.from_numpy(around).flatten() * (1.0 - self.known + self.inside)
+
+    @property
+    def color(self) -> torch.Tensor:
+        """The straight colour [1, 3] of the overlay."""
+        return straight(torch.tensor(self.overlay.color[None], dtype=torch.float32))[:, :3]
+
+    def opening(self, too_much: float = 1.0) -> Opening:
+        """A place for its first shape; by how much it matters what that covers too much."""
+        opacity, edge = (Slot(None, parameter) for parameter in LOOK)
+        alpha = self.overlay.opacity * float(self.overlay.color[3] if len(self.overlay.color) == 4 else 1.0)
+        looks = {opacity: torch.tensor([[alpha]]), edge: torch.zeros(1, 1)}
+        matters = self.known * torch.where(self.inside > 0, 1.0, too_much)
+        mask = Mask(matters, self.inside, 0.0)
+        return Opening(Group((), torch.tensor([0]), looks), 0, "", self.color, mask)
+
+    def cut(self, base: Group) -> Opening:
+        """A place for a shape that is cut out of one which covers too much."""
+        matters = self.known * self.cover(base)
+        too_much = (matters - self.inside).clamp_min(0.0)
+        return Opening(base, 1, SUBTRACTION, self.color, Mask(matters, too_much, 0.0))
+
+
+@dataclass(frozen=True)
+class Outlines:
+    """What the outlines of overlays were found to be; the surroundings rise in size."""
+
+    scene: SceneTensors
+    around: Sequence[Surroundings]
+    search: Search
+    done: dict[tuple[bytes, ...], Outlined | None] = field(default_factory=dict)
+
+    def topmost(self, regions: Regions) -> Outlined | None:
+        """The layer that lies on top of some regions; None where none is told.
+
+        Another shape where one is bitten is the likelier: bites wait until there is nothing else.
+        """
+        good = self._good(overlays(regions), regions)
+        top = [
+            each for each in good if not any(each.lies_under(other) for other in good if other is not each)
+        ]
+        found = top or good
+        for whole in (True, False):
+            if all(each.bitten for each in found):
+                found += self._good(opaque(regions, self.scene.background.numpy(), whole), regions)
+        return min(found, key=lambda each: each.rank, default=None)
+
+    def _good(self, tried: Iterable[Overlay], regions: Regions) -> list[Outlined]:
+        """Those of some overlays that a shape has the outline of."""
+        outlined = (self._of(overlay, regions) for overlay in tried)
+        return [each for each in outlined if each is not None and each.is_good]
+
+    def _of(self, overlay: Overlay, regions: Regions) -> Outlined | None:
+        """The shape that comes nearest to an overlay, or a shape with another cut out of it; None for no pixel."""
+        area = self._area(overlay, regions)
+        if area.key not in self.done:
+            self.done[area.key] = _outlined(area, self.search)
+        found = self.done[area.key]
+        return replace(found, overlay=overlay) if found else None
+
+    def _area(self, overlay: Overlay, regions: Regions) -> Area:
+        """Where an overlay is, in a window of the largest surroundings in which that has few enough points."""
+        inside, outside = (regions.mask(chosen) for chosen in (overlay.inside, overlay.outside))
+        for around in reversed(self.around):
+            masks = [_shares(mask, around) for mask in (inside, outside)]
+            window = _window(masks[0])
+            if around is self.around[0] or _points(window) <= POINTS:
+                break
+        own, others = (torch.from_numpy(np.ascontiguousarray(mask[window])).flatten() for mask in masks)
+        return Area(overlay, own, own + others, around.window(*window), _is_soft(inside, regions))
+
+
+def opaque(regions: Regions, ground: np.ndarray, whole: bool) -> Iterator[Overlay]:
+    """What may be opaque on top: the regions of each colour but the ground's, all of one together, or each alone."""
+    colors, doubts = regions.colors, regions.doubts
+    count, channels = colors.shape
+    is_ground = (np.abs(colors - ground[:channels]) <= 2 * doubts[:, None]).all(axis=1)
+    apart = np.abs(colors[:, None] - colors[None]).max(axis=2, initial=0.0)
+    alike = (apart <= doubts[:, None] + doubts[None]) & ~is_ground if whole else np.eye(count, dtype=bool)
+    done = is_ground.copy()
+    for number in range(count):
+        if not done[number]:
+            done |= alike[number]
+            yield Overlay(1.0, colors[number], alike[number], ~alike[number])
+
+
+def _shares(mask: BoolArray, around: Surroundings) -> np.ndarray:
+    """The share of each pixel of some surroundings [H, W] that a mask, perhaps finer, covers."""
+    finer = torch.from_numpy(mask)[None, None].float()
+    return interpolate(finer, size=around.shape, mode="area")[0, 0].numpy()
+
+
+def _window(shares: np.ndarray) -> tuple[slice, slice]:
+    """Rows and columns around what is covered, with a margin."""
+    found = ndimage.find_objects((shares > 0).astype(int))
+    if not found:
+        return slice(0, 1), slice(0, 1)
+    share, pixels = MARGIN
+    margin = round(share * max(each.stop - each.start for each in found[0])) + pixels
+    rows, columns = (
+        slice(max(each.start - margin, 0), min(each.stop + margin, size))
+        for each, size in zip(found[0], shares.shape, strict=True)
+    )
+    return rows, columns
+
+
+def _is_soft(inside: BoolArray, regions: Regions) -> bool:
+    """Whether most of an edge goes over into others by colours that no region has."""
+    edge = inside & ~ndimage.binary_erosion(inside, border_value=1)
+    return bool((edge & ndimage.binary_dilation(~regions.sure)).sum() > 0.5 * edge.sum())
+
+
+def _points(window: tuple[slice, slice]) -> int:
+    rows, columns = window
+    return int((rows.stop - rows.start) * (columns.stop - columns.start))
+
+
+def _outlined(area: Area, search: Search) -> Outlined | None:
+    """The best that shapes of all kinds come to; None where there is less than a pixel."""
+    proposer = search.proposer(area.around)
+    plain = _single(area, area.opening(), proposer) if area.inside.max() > 0.5 else []
+    if not plain:
+        return None
+    best = _sharpest(plain, area, proposer)
+    if best.is_good:
+        return best
+    wide = sorted(_single(area, area.opening(EAGER), proposer), key=lambda each: _eager(each, area))
+    cut = [
+        area.outlined(tried.layer)
+        for base in _distinct(wide)[:BASES]
+        for tried in proposer.candidates([area.cut(base.layer)], area.around)[0]
+    ]
+    return _sharpest([best, *cut], area, proposer)
+
+
+def _distinct(ranked: Sequence[Outlined]) -> list[Outlined]:
+    """The first of each structure."""
+    found: dict[Structure, Outlined] = {}
+    for each in ranked:
+        found.setdefault(each.layer.structure, each)
+    return list(found.values())
+
+
+def _sharpest(tried: Sequence[Outlined], area: Area, proposer: Proposer) -> Outlined:
+    """The best of the likeliest structures, after some steps of their outlines."""
+    likely = _distinct(sorted(tried, key=lambda each: each.score))[:LIKELY]
+    mask = area.opening().mask
+    sharp = [
+        area.outlined(proposer.sharpened(each.layer, mask, area.around, STEPS))
+        for each in likely
+        if each.off < HOPEFUL
+    ]
+    return min([*tried, *sharp], key=lambda each: each.score)
+
+
+def _single(area: Area, opening: Opening, proposer: Proposer) -> list[Outlined]:
+    """All that shapes of every kind come to in an opening for an area."""
+    starts = [proposer.placed(wanted, area.around) for wanted in (area.inside, area.hull())]
+    places = [opening] * len(starts)
+    ends = (proposer.optima(kind, places, starts, area.around, STARTS) for kind in proposer.kinds)
+    return [area.outlined(layer) for found in ends for _, layer in found]
+
+
+def _eager(tried: Outlined, area: Area) -> float:
+    """What is missed where what is covered too much matters less."""
+    cover = area.cover(tried.layer)
+    return float(((1 - cover) * area.inside + EAGER * cover * (area.known - area.inside)).sum())

@@ -1,0 +1,169 @@
+"""The flat regions of a picture, which colours they have, and which of them are neighbours."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from functools import cached_property
+from itertools import combinations, product
+
+import numpy as np
+from scipy import ndimage
+from scipy.sparse import coo_matrix
+from scipy.sparse.csgraph import connected_components
+
+from ..arrays import BoolArray, Float64Array, IntArray
+
+STEADY, EVEN = 1.5 / 255, 4.0 / 255  # how far neighbours of a flat region differ at most; and any two of it
+LEAST = 6  # pixels of a region
+MOST = 80  # regions, the largest
+REACH, SURELY = (
+    4.0,
+    2.0,
+)  # pixels from a region that are shared out among those around, at most: edges; that surely are
+EXACT = 1.0 / 255  # how far the colour of a region may be off
+NEAR = 5  # pixels across, in which another region is near
+BESIDE = 2  # pixels of a common edge that make neighbours
+
+
+@dataclass(frozen=True)
+class Regions:
+    """Regions by number from 1, 0 for none, [H, W], and where that is sure; the colour [R, C] of each, and how far that
+    may be off [R].
+    """
+
+    labels: IntArray
+    sure: BoolArray
+    colors: Float64Array
+    doubts: Float64Array
+
+    @classmethod
+    def of(cls, pixels: Float64Array) -> Regions:
+        """Those of a picture [H, W, C]; what lies between them is of the nearest."""
+        parts = _connected(pixels, _calm(pixels))
+        sizes = np.bincount(parts.ravel())
+        sizes[0] = 0
+        labels, sure, colors = np.zeros_like(parts), np.zeros(parts.shape, bool), []
+        for number in np.argsort(-sizes, kind="stable")[:MOST]:
+            inside = parts == number
+            if sizes[number] >= LEAST and (np.ptp(pixels[inside], axis=0) <= EVEN).all():
+                colors.append(np.median(pixels[inside], axis=0))
+                labels[inside] = len(colors)
+        known = np.array(colors).reshape(-1, pixels.shape[2])
+        if colors:
+            labels, sure = _shared_out(pixels, labels, known)
+        return cls(labels, sure, known, np.full(len(known), EXACT)).merged()
+
+    @cached_property
+    def borders(self) -> IntArray:
+        """How many pixels of each region lie beside one of each other, [R, R]."""
+        found = np.zeros((len(self.colors) + 1,) * 2, np.int64)
+        for one, other in (
+            (self.labels[:, 1:], self.labels[:, :-1]),
+            (self.labels[1:], self.labels[:-1]),
+        ):
+            np.add.at(found, (one, other), 1)
+            np.add.at(found, (other, one), 1)
+        np.fill_diagonal(found, 0)
+        return found[1:, 1:]
+
+    @cached_property
+    def beside(self) -> BoolArray:
+        """Which regions are neighbours, [R, R]."""
+        return self.borders >= BESIDE
+
+    @cached_property
+    def areas(self) -> IntArray:
+        """Pixels of each, [R]."""
+        return np.bincount(self.labels.ravel(), minlength=len(self.colors) + 1)[1:]
+
+    def mask(self, chosen: BoolArray) -> BoolArray:
+        """Where some of them [R] surely are, [H, W]."""
+        return np.concatenate([[False], chosen])[self.labels] & self.sure
+
+    def recolored(self, chosen: BoolArray, colors: Float64Array, doubts: Float64Array) -> Regions:
+        """The same where some [R] have other colours; neighbours that have come to be alike are one."""
+        recolored, doubted = self.colors.copy(), self.doubts.copy()
+        recolored[chosen], doubted[chosen] = colors, doubts
+        return replace(self, colors=recolored, doubts=doubted).merged()
+
+    def hidden(self, chosen: BoolArray) -> Regions:
+        """The same where some [R] are no longer seen: it is not known what is there."""
+        numbers = np.concatenate([[0], np.where(chosen, 0, np.cumsum(~chosen))])
+        return replace(
+            self, labels=numbers[self.labels], colors=self.colors[~chosen], doubts=self.doubts[~chosen]
+        )
+
+    def merged(self) -> Regions:
+        """The same with neighbours of one colour made one, the likest first."""
+        regions = self
+        while (pair := regions._likest()) is not None:
+            regions = regions._joined(*pair)
+        return regions
+
+    def _likest(self) -> tuple[int, int] | None:
+        """The two neighbours that differ least, where they may be of one colour."""
+        one, other = np.nonzero(np.triu(self.beside))
+        apart = np.abs(self.colors[one] - self.colors[other]).max(axis=1, initial=0.0)
+        excess = apart - self.doubts[one] - self.doubts[other]
+        if not (excess <= 0).any():
+            return None
+        best = int(np.where(excess <= 0, apart, np.inf).argmin())
+        return int(one[best]), int(other[best])
+
+    def _joined(self, one: int, other: int) -> Regions:
+        """The same with the second region part of the first, which comes before it."""
+        pair = [one, other]
+        colors, doubts = self.colors.copy(), self.doubts.copy()
+        colors[one] = np.average(self.colors[pair], axis=0, weights=self.doubts[pair] ** -2)
+        doubts[one] = self.doubts[pair].min()
+        labels = np.where(self.labels == other + 1, one + 1, self.labels)
+        labels = labels - (labels > other + 1)
+        return Regions(labels, self.sure, np.delete(colors, other, axis=0), np.delete(doubts, other))
+
+
+def _calm(pixels: Float64Array) -> BoolArray:
+    """Where a picture [H, W, C] has one colour in four pixels that make a square."""
+    squares = np.ones((pixels.shape[0] - 1, pixels.shape[1] - 1), bool)
+    for one, other in combinations((pixels[:-1, :-1], pixels[:-1, 1:], pixels[1:, :-1], pixels[1:, 1:]), 2):
+        squares &= np.abs(one - other).max(axis=2) <= STEADY
+    calm = np.zeros(pixels.shape[:2], bool)
+    for rows, columns in product((slice(None, -1), slice(1, None)), repeat=2):
+        calm[rows, columns] |= squares
+    return calm
+
+
+def _connected(pixels: Float64Array, calm: BoolArray) -> IntArray:
+    """Numbers from 1 of what is connected, by neighbours of about one colour, where a picture is calm; else 0."""
+    numbers = np.arange(calm.size).reshape(calm.shape)
+    pairs = []
+    for one, other in ((np.s_[:, 1:], np.s_[:, :-1]), (np.s_[1:], np.s_[:-1])):
+        alike = np.abs(pixels[one] - pixels[other]).max(axis=2) <= STEADY
+        alike &= calm[one] & calm[other]
+        pairs.append(np.stack([numbers[one][alike], numbers[other][alike]]))
+    ends = np.concatenate(pairs, axis=1)
+    graph = coo_matrix((np.ones(ends.shape[1], bool), ends), shape=(calm.size, calm.size))
+    _, found = connected_components(graph, directed=False)
+    return np.where(calm, found.reshape(calm.shape).astype(np.int64) + 1, 0)
+
+
+def _shared_out(pixels: Float64Array, cores: IntArray, colors: Float64Array) -> tuple[IntArray, BoolArray]:
+    """Of a picture [H, W, C] what is in no region as well, each of that which is likest nearby, else of the nearest;
+    and where that is sure.
+    """
+    away, nearest = ndimage.distance_transform_edt(cores == 0, return_indices=True)
+    labels = np.where(away <= REACH, cores[tuple(nearest)], 0)
+    padded = np.pad(cores, 2)
+    least = np.where(cores > 0, 0.0, np.inf)
+    for down, right in product(range(5), repeat=2):
+        beside = padded[down:, right:][: cores.shape[0], : cores.shape[1]]
+        apart = np.where(beside > 0, np.abs(pixels - colors[beside - 1]).max(axis=2), np.inf)
+        labels = np.where(apart < least, beside, labels)
+        least = np.minimum(apart, least)
+    return labels, (away <= SURELY) & ~_foreign(pixels, labels, colors)
+
+
+def _foreign(pixels: Float64Array, labels: IntArray, colors: Float64Array) -> BoolArray:
+    """Where a picture [H, W, C] has another colour than the region there though no other is near: what is thin."""
+    alone: BoolArray = ndimage.maximum_filter(labels, NEAR) == ndimage.minimum_filter(labels, NEAR)
+    apart: Float64Array = np.abs(pixels - colors[labels - 1]).max(axis=2)
+    return alone & (apart > EVEN) & (labels > 0)

@@ -1,0 +1,192 @@
+"""Drawings taken apart: their regions, what a translucent layer is told by, outlines; on pictures drawn in numpy."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+import torch
+
+from sdf2vec.fit import sparse
+from sdf2vec.fit.auto import Drawing
+from sdf2vec.fit.initialization import Layers
+from sdf2vec.fit.joining import Search
+from sdf2vec.fit.peeling import peeled
+from sdf2vec.fit.region_graph import Regions
+from sdf2vec.fit.settings import settings_of
+from sdf2vec.fit.surroundings import View
+from sdf2vec.fit.transparency import bared, overlays
+from sdf2vec.image import Picture
+from sdf2vec.render.tensors import SceneTensors, to_scene
+
+WHITE, BLUE, RED, GREEN = (
+    np.array(c) for c in ((1, 1, 1), (0.1, 0.2, 0.8), (0.9, 0.1, 0.1), (0.2, 0.7, 0.3))
+)
+SIDE, FINER = 96, 4
+KINDS = ("circle", "ellipse", "box", "triangle")
+
+
+def points():
+    """Pixels' samples x, y [n, n]."""
+    return np.meshgrid(*((np.arange(SIDE * FINER) + 0.5) / FINER,) * 2)
+
+
+def disc(x, y, radius):
+    across, down = points()
+    return np.hypot(across - x, down - y) < radius
+
+
+def box(left, top, right, bottom):
+    x, y = points()
+    return (x > left) & (x < right) & (y > top) & (y < bottom)
+
+
+def painted(*layers, ground=WHITE):
+    """A picture [H, W, 3] of masks in colours and opacities, sixteen samples a pixel, in 8 bits."""
+    image = np.broadcast_to(ground, (SIDE * FINER, SIDE * FINER, 3)).astype(float)
+    for mask, color, opacity in layers:
+        image = image + (opacity * mask)[..., None] * (color - image)
+    means = image.reshape(SIDE, FINER, SIDE, FINER, 3).mean(axis=(1, 3))
+    return np.rint(means * 255) / 255
+
+
+def apart(pixels):
+    """The layers that are told by their outlines, from the bottom up, lengths in pixels."""
+    target = torch.from_numpy(np.ascontiguousarray(pixels.transpose(2, 0, 1))).float()
+    search = Search(
+        Layers(KINDS, "over"), (1e-4, 0.1), torch.Generator().manual_seed(0), lambda error: None, 1 / SIDE
+    )
+    bare = SceneTensors([], torch.tensor([*WHITE, 1.0]).float(), "over", (1.0, 1.0))
+    return to_scene(peeled(bare, [View(target, None)], search), SIDE, SIDE).layers
+
+
+# --- regions ------------------------------------------------------------------------------------------------
+
+
+def test_regions_are_flat_and_share_out_what_is_between_them():
+    regions = Regions.of(painted((disc(48, 48, 20), BLUE, 1.0)))
+    assert len(regions.colors) == 2
+    assert regions.areas.sum() == SIDE * SIDE
+    assert regions.areas.min() == pytest.approx(np.pi * 20**2, rel=0.01)
+    assert regions.colors[1] == pytest.approx(BLUE, abs=1 / 255)
+    assert regions.beside.tolist() == [[False, True], [True, False]]
+
+
+def test_pixels_of_one_colour_that_do_not_touch_are_two_regions():
+    regions = Regions.of(painted((box(10, 10, 30, 30), BLUE, 1.0), (box(50, 50, 80, 80), BLUE, 1.0)))
+    assert len(regions.colors) == 3
+    assert not regions.beside[1, 2]
+
+
+def test_what_is_thin_is_surely_not_of_the_region_around_it():
+    regions = Regions.of(painted((box(20, 48, 80, 49), BLUE, 1.0)))
+    assert len(regions.colors) == 1
+    assert (~regions.sure).sum() == 60
+
+
+def test_a_gradient_is_no_region():
+    pixels = painted()
+    pixels[20:60, 20:80] = np.linspace(0, 1, 60)[None, :, None]
+    regions = Regions.of(pixels)
+    assert len(regions.colors) == 1
+    assert not regions.labels[40, 50]
+
+
+def test_neighbours_of_one_colour_become_one_region():
+    regions = Regions.of(painted((box(0, 0, 48, 96), BLUE, 1.0)))
+    one = regions.recolored(np.array([True, False]), regions.colors[1], regions.doubts[:1])
+    assert len(one.colors) == 1
+    assert one.areas.tolist() == [SIDE * SIDE]
+
+
+def test_what_is_hidden_is_not_known():
+    regions = Regions.of(painted((box(20, 20, 50, 60), BLUE, 1.0), (disc(70, 70, 15), RED, 1.0)))
+    hidden = regions.hidden(np.array([False, True, False]))
+    assert len(hidden.colors) == 2
+    assert (hidden.labels[22:58, 22:48] == 0).all()
+    assert hidden.colors[hidden.labels[70, 70] - 1] == pytest.approx(RED, abs=1 / 255)
+
+
+@pytest.mark.parametrize("shape", [(1, 1, 3), (1, 300, 3), (300, 2, 4)])
+def test_the_smallest_pictures_have_regions_or_none(shape):
+    assert len(Regions.of(np.zeros(shape)).colors) == (shape[1] == 2)
+
+
+# --- translucent layers -------------------------------------------------------------------------------------
+
+OVER_TWO = (box(0, 0, 48, 96), BLUE, 1.0), (box(20, 30, 76, 66), RED, 0.4)
+
+
+def test_a_translucent_layer_over_two_colours_is_told_with_its_opacity_and_colour():
+    regions = Regions.of(painted(*OVER_TWO))
+    (overlay,) = overlays(regions)
+    assert overlay.opacity == pytest.approx(0.4, abs=0.01)
+    assert overlay.color == pytest.approx(RED, abs=0.02)
+    assert regions.mask(overlay.inside).sum() == 56 * 36
+
+
+def test_without_it_the_two_colours_are_left():
+    regions = Regions.of(painted(*OVER_TWO))
+    left = bared(regions, overlays(regions)[0])
+    assert left.areas.tolist() == [SIDE * SIDE / 2] * 2
+    assert sorted(left.colors.tolist()) == pytest.approx(np.array([BLUE, WHITE]), abs=0.01)
+
+
+@pytest.mark.parametrize("other", [GREEN, 0.6 * WHITE + 0.4 * RED + np.array([0.05, 0.0, 0.0])])
+def test_what_does_not_keep_the_difference_of_two_colours_is_not_translucent(other):
+    shown = (box(20, 30, 48, 66), 0.6 * BLUE + 0.4 * RED, 1.0), (box(48, 30, 76, 66), other, 1.0)
+    assert not overlays(Regions.of(painted(OVER_TWO[0], *shown)))
+
+
+# --- outlines -----------------------------------------------------------------------------------------------
+
+
+def test_what_is_partly_hidden_is_found_whole_and_below():
+    under, over = apart(painted((disc(40, 44, 22), BLUE, 1.0), (box(44, 40, 84, 70), RED, 1.0)))
+    assert (under.shapes[0].kind, over.shapes[0].kind) == ("circle", "box")
+    x, y, radius = (number * SIDE for number in under.shapes[0].parameters)
+    assert (x + 48, y + 48, radius) == pytest.approx((40, 44, 22), abs=0.3)
+    assert under.shapes[0].color == pytest.approx(BLUE, abs=0.01)
+
+
+def test_translucent_shapes_that_overlap_are_one_layer_each():
+    layers = apart(
+        painted(
+            (box(12, 20, 60, 56), BLUE, 1.0),
+            (disc(60, 60, 24), GREEN, 0.5),
+            (box(36, 40, 88, 88), RED, 0.6),
+        )
+    )
+    assert [layer.shapes[0].kind for layer in layers] == ["box", "circle", "box"]
+    assert [layer.opacity for layer in layers] == pytest.approx([1.0, 0.5, 0.6], abs=0.02)
+
+
+def test_a_ring_is_one_layer_and_what_bites_into_a_disc_is_another():
+    ring = disc(30, 30, 22) & ~disc(30, 30, 14)
+    layers = apart(
+        painted((ring, BLUE, 1.0), (disc(66, 60, 20), RED, 1.0), (box(60, 50, 92, 92), GREEN, 1.0))
+    )
+    assert sorted(tuple(s.kind for s in layer.shapes) for layer in layers) == [
+        ("box",),
+        ("circle",),
+        ("circle", "circle"),
+    ]
+
+
+def test_what_no_shape_has_the_outline_of_is_left():
+    letter = box(20, 20, 36, 80) | box(20, 64, 70, 80)
+    assert not apart(painted((letter, BLUE, 1.0)))
+
+
+def test_a_soft_disc_is_left_to_be_found_by_its_colours():
+    x, y = np.meshgrid(*(np.arange(SIDE) + 0.5,) * 2)
+    soft = 1 / (1 + np.exp((np.hypot(x - 40, y - 44) - 20) / 3))
+    pixels = WHITE + soft[..., None] * (BLUE - WHITE)
+    assert not apart(np.rint(pixels * 255) / 255)
+
+
+@pytest.mark.parametrize(("most", "layers"), [(2, 2), (1, 0)])
+def test_no_more_layers_are_taken_than_are_allowed(most, layers):
+    pixels = painted((disc(30, 30, 20), BLUE, 1.0), (disc(66, 64, 20), RED, 1.0)).astype(np.float32)
+    drawing = Drawing(Picture(pixels), settings_of(), lambda progress: False, flat=True)
+    found = sparse.taken_apart(drawing.scene, drawing.sizes, drawing.search, most)
+    assert found.layer_count == layers
