@@ -223,17 +223,31 @@ class Outlines:
 
 
 def opaque(regions: Regions, ground: np.ndarray, whole: bool) -> Iterator[Overlay]:
-    """What may be opaque on top: the regions of each colour but the ground's, all of one together, or each alone."""
+    """What may be opaque on top: the regions of each colour but the ground's, each alone, or all of one shape together:
+    of one colour, and connected but for what is not known.
+    """
     colors, doubts = regions.colors, regions.doubts
     count, channels = colors.shape
     is_ground = (np.abs(colors - ground[:channels]) <= 2 * doubts[:, None]).all(axis=1)
     apart = np.abs(colors[:, None] - colors[None]).max(axis=2, initial=0.0)
-    alike = (apart <= doubts[:, None] + doubts[None]) & ~is_ground if whole else np.eye(count, dtype=bool)
+    alike = (apart <= doubts[:, None] + doubts[None]) & ~is_ground
     done = is_ground.copy()
     for number in range(count):
         if not done[number]:
-            done |= alike[number]
-            yield Overlay(1.0, colors[number], alike[number], ~alike[number])
+            inside = _linked(number, alike[number], regions) if whole else np.arange(count) == number
+            done |= inside
+            yield Overlay(1.0, colors[number], inside, ~inside)
+
+
+def _linked(number: int, alike: BoolArray, regions: Regions) -> BoolArray:
+    """Which of some regions [R] one is connected with, by themselves and by what is not known."""
+    numbers = np.concatenate([[True], alike])[regions.labels]
+    parts, _ = ndimage.label(numbers)
+    own = np.unique(parts[regions.labels == number + 1])
+    reached = np.unique(regions.labels[np.isin(parts, own)])
+    linked = np.zeros(len(alike), bool)
+    linked[reached[reached > 0] - 1] = True
+    return linked
 
 
 def _shares(mask: BoolArray, around: Surroundings) -> np.ndarray:
