@@ -45,6 +45,7 @@ from .sparse import (
     grow,
     needed,
     pruned,
+    softer,
     taken_apart,
 )
 from .surroundings import View
@@ -279,6 +280,7 @@ class Drawing:
 
     def _finish(self) -> None:
         worst = 0.0 if self.settings.target_psnr is None else self.floor
+        self.scene = softer(self.scene, self.sizes.joint, self.search)
         few = self.scene.layer_count <= THOROUGHLY
         if worst or few:
             hope = THOROUGH if few else USUAL

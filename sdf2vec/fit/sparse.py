@@ -48,6 +48,7 @@ WORST = 0.1  # of all that is wrong, where a layer is whose shapes are exchanged
 PROMISING = (
     3.0  # times the error before, of another shape in the place of one while the others are as they were
 )
+SOFT = 2.0  # pixels of the picture where all descend: edges that may become soft or sharp
 RETHOUGHT = 2  # colours whose layers are found anew in a round, at most
 
 
@@ -136,9 +137,15 @@ def taken_apart(scene: SceneTensors, sizes: Sizes, search: Search, most: int) ->
     made = peeled(scene, sizes, search)
     if not 0 < made.layer_count <= most:
         return scene
-    for _ in range(2):
-        made = descended(made, sizes.joint, search, JOINT)
+    made = softer(descended(made, sizes.joint, search, JOINT), sizes.joint, search)
+    made = descended(made, sizes.joint, search, JOINT)
     return min(scene, made, key=partial(error_of, view=sizes.joint))
+
+
+def softer(scene: SceneTensors, view: View, search: Search) -> SceneTensors:
+    """The scene after a descent from softer edges, if that is better: what is sharp never becomes soft by itself."""
+    made = descended(_softened(scene, SOFT / min(view.target.shape[1:])), view, search, AFTER)
+    return min(scene, made, key=partial(error_of, view=view))
 
 
 def finished(scene: SceneTensors, sizes: Sizes, search: Search) -> SceneTensors:

@@ -16,7 +16,8 @@ from sdf2vec.fit.settings import settings_of
 from sdf2vec.fit.surroundings import View
 from sdf2vec.fit.transparency import bared, overlays
 from sdf2vec.image import Picture
-from sdf2vec.render.tensors import SceneTensors, to_scene
+from sdf2vec.render.tensors import SceneTensors, from_scene, to_scene
+from sdf2vec.scene import Layer, Scene, Shape
 
 WHITE, BLUE, RED, GREEN = (
     np.array(c) for c in ((1, 1, 1), (0.1, 0.2, 0.8), (0.9, 0.1, 0.1), (0.2, 0.7, 0.3))
@@ -51,12 +52,18 @@ def painted(*layers, ground=WHITE):
 
 def apart(pixels):
     """The layers that are told by their outlines, from the bottom up, lengths in pixels."""
-    target = torch.from_numpy(np.ascontiguousarray(pixels.transpose(2, 0, 1))).float()
-    search = Search(
-        Layers(KINDS, "over"), (1e-4, 0.1), torch.Generator().manual_seed(0), lambda error: None, 1 / SIDE
-    )
     bare = SceneTensors([], torch.tensor([*WHITE, 1.0]).float(), "over", (1.0, 1.0))
-    return to_scene(peeled(bare, [View(target, None)], search), SIDE, SIDE).layers
+    return to_scene(peeled(bare, [view_of(pixels)], search_of()), SIDE, SIDE).layers
+
+
+def view_of(pixels):
+    return View(torch.from_numpy(np.ascontiguousarray(pixels.transpose(2, 0, 1))).float(), None)
+
+
+def search_of():
+    return Search(
+        Layers(KINDS, "over"), (0.0, 0.1), torch.Generator().manual_seed(0), lambda error: None, 1 / SIDE
+    )
 
 
 # --- regions ------------------------------------------------------------------------------------------------
@@ -182,6 +189,31 @@ def test_a_soft_disc_is_left_to_be_found_by_its_colours():
     soft = 1 / (1 + np.exp((np.hypot(x - 40, y - 44) - 20) / 3))
     pixels = WHITE + soft[..., None] * (BLUE - WHITE)
     assert not apart(np.rint(pixels * 255) / 255)
+
+
+def test_edges_become_as_soft_as_the_picture_has_them():
+    """One disc with an edge over 3 pixels, and one that is sharp, from two that are sharp: float64 in numpy."""
+    x, y = np.meshgrid(*(np.arange(SIDE) + 0.5,) * 2)
+    pixels = painted((disc(66, 64, 20), RED, 1.0))
+    soft = 1 / (1 + np.exp(10 * np.hypot(x - 30, y - 30) / 3 - 5 - 10 * 20 / 3))
+    pixels += soft[..., None] * (BLUE - pixels)
+    search, view = search_of(), view_of(pixels)
+    sharp = from_scene(
+        Scene(SIDE, SIDE, (sharp_disc(BLUE, 30, 30), sharp_disc(RED, 66, 64)), (1.0, 1.0, 1.0))
+    )
+    still = sparse.descended(sharp, view, search, sparse.AFTER)
+    made = sparse.softer(sharp, view, search)
+    first, second = to_scene(made, SIDE, SIDE).layers
+    assert to_scene(still, SIDE, SIDE).layers[0].falloff * SIDE < 1.6
+    assert first.falloff * SIDE == pytest.approx(3, rel=0.05)
+    assert second.falloff * SIDE < 1.7  # what the sharpest edge of a pixel is
+    assert sparse.error_of(made, view) < 0.2 * sparse.error_of(still, view)
+
+
+def sharp_disc(color, x, y):
+    center = x / SIDE - 0.5, y / SIDE - 0.5
+    red, green, blue = map(float, color)
+    return Layer((Shape.of("circle", (red, green, blue), center=center, radius=20 / SIDE),))
 
 
 @pytest.mark.parametrize(("most", "layers"), [(2, 2), (1, 0)])
