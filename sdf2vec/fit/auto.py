@@ -10,6 +10,7 @@ import math
 from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from itertools import islice
 
 import numpy as np
 import torch
@@ -54,7 +55,8 @@ from .views import scaled, view_of
 
 THOROUGHLY = 12  # layers, at most, which in the end are tried without even where they matter
 SEARCH, JOINT, LAST = 56, 128, 320  # pixels squared
-FEW = 4  # shapes that are placed by trial, also where their number is given
+FEW = 4  # shapes that are placed by trial, of any picture, also where their number is given
+SOME, ROUNDS = 64, 4  # shapes that are, of a drawing, where their number is given; rounds of that search
 LEVELS = 3.5 / 255  # by which pixels of one flat colour differ at most
 STEADY = 1.5 / 255  # by which they do of a drawing: photographs have noise
 FLAT = 0.6  # share of pixels next to the same colour, of a drawing in flat colours
@@ -127,7 +129,7 @@ def _few(picture: Picture, settings: Settings, callback: Callback) -> Fitted | N
     if not _may_be_few(settings):
         return None
     flat = is_flat(picture)
-    if settings.shapes == AUTO and is_photograph(picture, flat):
+    if _is_for_drawings(settings) and is_photograph(picture, flat):
         return None
     drawing = Drawing(picture, settings, callback, flat)
     found = drawing.found()
@@ -194,8 +196,13 @@ def _may_be_few(settings: Settings) -> bool:
     plain = settings.compositing == "over" and settings.union == 1 and settings.start is None
     plain = plain and settings.paint == ONE_COLOR and settings.min_area is None
     more = settings.palette or settings.colors or settings.cuts or settings.trials
-    few = settings.shapes == AUTO or settings.shapes <= FEW
+    few = settings.shapes == AUTO or settings.shapes <= SOME
     return plain and few and not more and bool(settings.drawn_kinds) and settings.target_flip is None
+
+
+def _is_for_drawings(settings: Settings) -> bool:
+    """Whether only drawings are searched for their shapes: of few, those of any picture are."""
+    return settings.shapes == AUTO or settings.shapes > FEW
 
 
 def _going_on(settings: Settings, found: Scene) -> Settings:
@@ -263,7 +270,8 @@ class Drawing:
             self.scene = grounded(self.scene, self.sizes.joint, self.search)
             if not self.scene.groups:
                 self.scene = taken_apart(self.scene, self.sizes, self.search, self.settings.most)
-            for made in grow(self.scene, self.sizes, self.search, self.settings.most, self.floor):
+            rounds = grow(self.scene, self.sizes, self.search, self.settings.most, self.floor)
+            for made in islice(rounds, self._most_rounds):
                 if self._is_no_drawing(made):
                     self.gave_up = not self._was_good(made)
                     break
@@ -274,6 +282,11 @@ class Drawing:
             self.stopped = True
         self.error = error_of(self.scene, self.sizes.last)
         return concise(self._made(), self.picture, self.settings)
+
+    @property
+    def _most_rounds(self) -> int | None:
+        """How many rounds there may be; None for as many as help."""
+        return ROUNDS if self.settings.shapes != AUTO and self.settings.shapes > FEW else None
 
     def _made(self) -> Scene:
         return to_scene(self.scene, self.picture.width, self.picture.height)
