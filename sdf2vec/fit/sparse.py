@@ -49,10 +49,7 @@ PROMISING = (
     3.0  # times the error before, of another shape in the place of one while the others are as they were
 )
 SOFT = 2.0  # pixels of the picture where all descend: edges that may become soft or sharp
-SOFTENED, FOUND = (
-    0.8,
-    10**-3,
-)  # of the error before, at most, and mean squared error, 30 dB, after edges became soft
+SOFTENED, FOUND = 0.8, 10**-3  # of the error before, and mean squared error, at most, after edges became soft
 RETHOUGHT = 2  # colours whose layers are found anew in a round, at most
 
 

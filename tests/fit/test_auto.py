@@ -197,6 +197,37 @@ def test_few_shapes_are_exactly_as_many_as_told(drawn):
     assert scene.shape_count == 3
 
 
+FIVE_DISCS = WHITE + "".join(
+    f'<circle cx="{x}" cy="{y}" r="{r}" fill="{fill}"/>'
+    for x, y, r, fill in (
+        (30, 30, 18, "#0080e0"),
+        (66, 30, 18, "#e05020"),
+        (30, 66, 18, "#20b050"),
+        (66, 66, 18, "#e0c020"),
+        (48, 48, 14, "#303030"),
+    )
+)
+
+
+@pytest.mark.parametrize("count", [5, 8, 32])
+def test_a_drawing_is_searched_for_as_many_shapes_as_told(count, drawn):
+    """Triangles on the discs that there are, where more are wanted."""
+    picture = drawn(FIVE_DISCS)
+    scene = fit(picture, count, preset="fast")
+    kinds = kinds_of(scene)
+    assert kinds == ["circle"] * 5 + ["triangle"] * (count - 5)
+    assert quality(scene, picture).psnr >= 36
+
+
+def test_told_how_many_shapes_only_kinds_that_the_user_allows_are_found(drawn):
+    assert kinds_of(fit(drawn(FIVE_DISCS), 8, kind="box", preset="fast")) == ["box"] * 8
+
+
+def test_a_painting_is_not_searched_for_as_many_shapes_as_told(monkeypatch):
+    monkeypatch.setattr(auto.Drawing, "found", lambda self: pytest.fail("it is no drawing"))
+    assert fit(noise(), 8, preset="fast").shape_count == 8
+
+
 def test_what_is_no_drawing_gets_as_many_shapes_as_are_allowed():
     found = fitted(noise(), max_shapes=12, preset="fast")
     assert found.scene.shape_count == 12
