@@ -129,7 +129,7 @@ def _few(picture: Picture, settings: Settings, callback: Callback) -> Fitted | N
     if not _may_be_few(settings):
         return None
     flat = is_flat(picture)
-    if _is_for_drawings(settings) and is_photograph(picture, flat):
+    if (_is_some(settings) and not flat) or (settings.shapes == AUTO and is_photograph(picture, flat)):
         return None
     drawing = Drawing(picture, settings, callback, flat)
     found = drawing.found()
@@ -147,7 +147,8 @@ def _few(picture: Picture, settings: Settings, callback: Callback) -> Fitted | N
     if settings.shapes == AUTO:
         painted, _ = meeting(picture, going_on, callback)
     else:
-        painted = fit_concisely(picture, going_on, callback)
+        anew = [settings] if _is_some(settings) and drawing.error > GOOD else []
+        painted = _nearest([fit_concisely(picture, each, callback) for each in (going_on, *anew)], picture)
     as_wanted = settings.shapes == AUTO or (settings.shapes == found.shape_count and settings.loss is None)
     return _told(_nearest([painted, *([found] if as_wanted else [])], picture), picture, settings)
 
@@ -200,9 +201,9 @@ def _may_be_few(settings: Settings) -> bool:
     return plain and few and not more and bool(settings.drawn_kinds) and settings.target_flip is None
 
 
-def _is_for_drawings(settings: Settings) -> bool:
-    """Whether only drawings are searched for their shapes: of few, those of any picture are."""
-    return settings.shapes == AUTO or settings.shapes > FEW
+def _is_some(settings: Settings) -> bool:
+    """Whether more shapes are told than are placed by trial of any picture."""
+    return settings.shapes != AUTO and settings.shapes > FEW
 
 
 def _going_on(settings: Settings, found: Scene) -> Settings:
@@ -286,7 +287,7 @@ class Drawing:
     @property
     def _most_rounds(self) -> int | None:
         """How many rounds there may be; None for as many as help."""
-        return ROUNDS if self.settings.shapes != AUTO and self.settings.shapes > FEW else None
+        return ROUNDS if _is_some(self.settings) else None
 
     def _made(self) -> Scene:
         return to_scene(self.scene, self.picture.width, self.picture.height)

@@ -5,7 +5,6 @@ import pytest
 import torch
 from PIL import Image, ImageDraw
 
-import sdf2vec
 from sdf2vec.fit.initialization import Layers, Places, groups_at
 from sdf2vec.fit.loop import Fit
 from sdf2vec.fit.pilots import shares_of
@@ -37,8 +36,9 @@ def stripes():
 
 
 def test_what_serves_gets_the_shapes():
-    scene = sdf2vec.fit(stripes(), 16, kind="circle,box", preset="fast")
-    kinds = [shape.kind for layer in scene.layers for shape in layer.shapes]
+    fit = Fit(load(stripes()), settings_of(16, kind="circle,box", preset="fast"), lambda progress: False)
+    fit.run()
+    kinds = [shape.kind for layer in fit.scene().layers for shape in layer.shapes]
     assert kinds.count("box") >= 14
 
 
