@@ -129,7 +129,7 @@ def _few(picture: Picture, settings: Settings, callback: Callback) -> Fitted | N
     if not _may_be_few(settings):
         return None
     flat = is_flat(picture)
-    if (_is_some(settings) and not flat) or (settings.shapes == AUTO and is_photograph(picture, flat)):
+    if not _is_searched(picture, settings, flat):
         return None
     drawing = Drawing(picture, settings, callback, flat)
     found = drawing.found()
@@ -145,12 +145,13 @@ def _few(picture: Picture, settings: Settings, callback: Callback) -> Fitted | N
             return Fitted(enough, _counted(enough))
     going_on = _going_on(settings, found)
     if settings.shapes == AUTO:
-        painted, _ = meeting(picture, going_on, callback)
+        made = [meeting(picture, going_on, callback)[0]]
     else:
-        anew = [settings] if _is_some(settings) and drawing.error > GOOD else []
-        painted = _nearest([fit_concisely(picture, each, callback) for each in (going_on, *anew)], picture)
-    as_wanted = settings.shapes == AUTO or (settings.shapes == found.shape_count and settings.loss is None)
-    return _told(_nearest([painted, *([found] if as_wanted else [])], picture), picture, settings)
+        anew = [settings] if _is_some(settings) and found.layers and drawing.error > GOOD else []
+        made = [fit_concisely(picture, each, callback) for each in (going_on, *anew)]
+    if settings.shapes == AUTO or (settings.shapes == found.shape_count and settings.loss is None):
+        made.append(found)
+    return _told(_nearest(made, picture), picture, settings)
 
 
 def _enough(picture: Picture, settings: Settings, found: Scene, view: View, callback: Callback) -> Scene:
@@ -199,6 +200,13 @@ def _may_be_few(settings: Settings) -> bool:
     more = settings.palette or settings.colors or settings.cuts or settings.trials
     few = settings.shapes == AUTO or settings.shapes <= SOME
     return plain and few and not more and bool(settings.drawn_kinds) and settings.target_flip is None
+
+
+def _is_searched(picture: Picture, settings: Settings, flat: bool) -> bool:
+    """Whether shapes are looked for in a picture, `flat` or not: in any if they are few, else in drawings."""
+    if settings.shapes != AUTO and not _is_some(settings):
+        return True
+    return (flat or settings.shapes == AUTO) and not is_photograph(picture, flat)
 
 
 def _is_some(settings: Settings) -> bool:
@@ -272,7 +280,7 @@ class Drawing:
             if not self.scene.groups:
                 self.scene = taken_apart(self.scene, self.sizes, self.search, self.settings.most)
             rounds = grow(self.scene, self.sizes, self.search, self.settings.most, self.floor)
-            for made in islice(rounds, self._most_rounds):
+            for made in islice(rounds, ROUNDS if _is_some(self.settings) else None):
                 if self._is_no_drawing(made):
                     self.gave_up = not self._was_good(made)
                     break
@@ -283,11 +291,6 @@ class Drawing:
             self.stopped = True
         self.error = error_of(self.scene, self.sizes.last)
         return concise(self._made(), self.picture, self.settings)
-
-    @property
-    def _most_rounds(self) -> int | None:
-        """How many rounds there may be; None for as many as help."""
-        return ROUNDS if _is_some(self.settings) else None
 
     def _made(self) -> Scene:
         return to_scene(self.scene, self.picture.width, self.picture.height)

@@ -147,7 +147,7 @@ def softer(scene: SceneTensors, view: View, search: Search) -> SceneTensors:
     """The scene after a descent from softer edges, if that is clearly better: what is sharp hardly becomes soft by
     itself. Not where much is missing, which softness would make up for.
     """
-    made = descended(_softened(scene, SOFT / min(view.target.shape[1:])), view, search, AFTER)
+    made = descended(_softened(scene, SOFT, view), view, search, AFTER)
     helps = error_of(made, view) <= min(SOFTENED * error_of(scene, view), FOUND)
     return made if helps else scene
 
@@ -403,7 +403,7 @@ def _bare(
 
 def _settled(scene: SceneTensors, sizes: Sizes, search: Search, hope: Hope) -> tuple[SceneTensors, float]:
     """The scene after a descent from softer edges, and its error."""
-    scene = _softened(scene, hope.softness / min(sizes.joint.target.shape[1:]))
+    scene = _softened(scene, hope.softness, sizes.joint)
     if scene.layer_count <= FEW // 2:
         scene = _each_improved(scene, sizes.search, search)
     scene = descended(scene, sizes.joint, search, AFTER)
@@ -426,9 +426,9 @@ def _fewer(
     return None
 
 
-def _softened(scene: SceneTensors, least: float) -> SceneTensors:
-    """The scene with no edge that is less soft than that, in scene units."""
-    made = detached(scene)
+def _softened(scene: SceneTensors, pixels: float, view: View) -> SceneTensors:
+    """The scene with no edge that is less soft than so many pixels of a view."""
+    made, least = detached(scene), pixels / min(view.target.shape[1:])
     for group in made.groups:
         for slot, values in group.values.items():
             if slot.parameter.unit is FALLOFF:

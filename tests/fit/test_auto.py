@@ -228,6 +228,38 @@ def test_a_painting_is_not_searched_for_as_many_shapes_as_told(monkeypatch):
     assert fit(noise(), 8, preset="fast").shape_count == 8
 
 
+def test_an_enlarged_photograph_is_not_searched_for_as_many_shapes_as_told():
+    """Its pixels are like their neighbours, but not where it is small."""
+    large = Image.fromarray(data.astronaut()).resize((3400, 3400), Image.Resampling.BICUBIC)
+    picture = Picture((np.asarray(large) / 255).astype(np.float32))
+    assert is_flat(picture)
+    assert auto._few(picture, settings_of(8), lambda progress: False) is None
+
+
+@pytest.mark.parametrize(("error", "begun"), [(auto.GOOD / 2, [1]), (auto.GOOD * 2, [1, 0])])
+def test_what_is_found_far_from_a_drawing_is_fitted_from_nothing_too(error, begun, drawn, monkeypatch):
+    """The nearer is kept: here what begins with nothing, as what begins with all black ends so."""
+    picture, blank = drawn(FIVE_DISCS), Scene(96, 96, (), (0.0, 0.0, 0.0))
+    black = replace(
+        blank, layers=(Layer((Shape.of("circle", (0.0, 0.0, 0.0), center=(0.0, 0.0), radius=1.0),)),)
+    )
+    starts = []
+
+    def found(drawing):
+        drawing.error = error
+        return black
+
+    def fitted_from(picture, settings, callback):
+        starts.append(len(settings.start.layers) if settings.start else 0)
+        return black if settings.start else replace(blank, background=(1.0, 1.0, 1.0))
+
+    monkeypatch.setattr(auto.Drawing, "found", found)
+    monkeypatch.setattr(auto, "fit_concisely", fitted_from)
+    made = fit(picture, 8, preset="fast")
+    assert starts == begun
+    assert len(made.layers) == begun[-1]
+
+
 def test_what_is_no_drawing_gets_as_many_shapes_as_are_allowed():
     found = fitted(noise(), max_shapes=12, preset="fast")
     assert found.scene.shape_count == 12
