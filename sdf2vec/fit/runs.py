@@ -15,7 +15,8 @@ from ..render.tensors import SceneTensors
 
 RATE = 0.01  # of Adam, on logarithms of standard deviations
 ALIKE = math.log(1.25)  # between two logarithms of standard deviations
-LEAST = 0.95  # pixels: browsers draw narrower blurs each in its own way
+LEAST = 0.95  # pixels: browsers draw narrower blurs each in its own way,
+SHARP = 0.5 * (NONE + LEAST)  # or sharp, which these hardly are
 WIDEST = 0.08  # scene units: librsvg draws nothing beyond the edge, and what is wider fades there
 
 
@@ -47,9 +48,7 @@ class Softening:
         return Runs(self.counts, self.logs.exp())
 
     def settle(self) -> None:
-        """Joins runs of about the same blur, and moves these to what renderers draw alike, none or no narrow one, where
-        they stay.
-        """
+        """Joins runs of about the same blur, and moves these to where renderers draw them about alike."""
         found = self.logs.tolist()
         counts, logs = self.counts[:1], found[:1]
         for count, log in zip(self.counts[1:], found[1:], strict=True):
@@ -59,7 +58,8 @@ class Softening:
             else:
                 counts, logs = [*counts, count], [*logs, log]
         pixels = torch.tensor(logs).exp() / self.pixel
-        near = torch.where(pixels < 0.5 * (NONE + LEAST), 0.0, pixels.clamp(min=LEAST))
+        near = torch.where(pixels < SHARP, pixels, pixels.clamp(min=LEAST))
+        near = torch.where(pixels < NONE, 0.0, near)
         self.counts, self.logs, self.is_free = counts, (near * self.pixel).log(), False
 
     @property

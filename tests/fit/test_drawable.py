@@ -19,10 +19,10 @@ KINDS = ("triangle", "box", "circle")
 
 
 def test_softnesses_are_those_that_renderers_draw():
-    found = softnesses(np.array([0.1, 0.59, 0.7, 1.2, 1.4, 1.75, 1.9, 4.0, 4.2, 4.1]), 2)
-    assert found[:6].tolist() == pytest.approx([0.0, 0.0, 1.1, 1.1, 1.5, 1.5])
-    assert found[6] == pytest.approx(2.15)
-    assert found[7:] == pytest.approx([(4.0 * 4.1 * 4.2) ** (1 / 3)] * 3)  # k-means of logarithms
+    found = softnesses(np.array([0.1, 0.44, 0.5, 0.7, 0.8, 1.2, 1.4, 1.75, 1.9, 4.0, 4.2, 4.1]), 2)
+    assert found[:8].tolist() == pytest.approx([0.0, 0.0, 0.62, 0.62, 0.85, 1.1, 1.5, 1.5])
+    assert found[8] == pytest.approx(2.15)
+    assert found[9:] == pytest.approx([(4.0 * 4.1 * 4.2) ** (1 / 3)] * 3)  # k-means of logarithms
 
 
 def of_kinds(**size):
@@ -58,7 +58,7 @@ def test_all_numbers_can_be_said(descended):
         assert is_whole(shape.color, 15)
         assert is_whole(layer.opacity, 5)
         assert layer.opacity > 0
-    assert len({layer.falloff for layer in found.layers}) <= GRAIN.softnesses + 3
+    assert len({layer.falloff for layer in found.layers}) <= GRAIN.softnesses + 5
 
 
 def test_what_rounding_loses_is_made_up_for():

@@ -40,8 +40,9 @@ def test_the_smallest_drawing_says_a_triangle_in_few_bytes():
     assert len(groups) <= 3
     assert all("url(#" in group.get("filter", "") for group in groups)
     assert len(paths) == 256
+    fills = [path.get("fill", group.get("fill", "")) for group in groups for path in group]
+    assert {len(fill) for fill in fills} == {4}  # of a run of one its group says it
     for path in paths:
-        assert len(path.get("fill", "")) == 4
         assert len(path.get("opacity", ".1")) == 2
         assert "." not in path.get("d", ".")
     assert len(gzip.compress(text.replace(f"<!-- {MARK} -->", "").encode(), 9)) <= 4480

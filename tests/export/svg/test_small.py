@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from sdf2vec import Layer, Scene, Shape, export, exported, fit
+from sdf2vec.blend import EDGE_DEVIATION
 from sdf2vec.engines import ENGINES
 from sdf2vec.export.options import Options
 from sdf2vec.export.svg import small_svg
@@ -81,6 +82,20 @@ def test_so_are_layers_of_several_shapes_and_gradients(engine, grain, require_en
     text = str(small_svg(drawable, Options(), grain).data)
     assert "Gradient" in text
     assert_as_rendered(engine, text, drawable.scene, 32, 1.0)
+
+
+@pytest.mark.parametrize("engine", ["resvg", "firefox"])
+@pytest.mark.parametrize("deviation", [0.55, 0.8])
+def test_narrow_edges_are_blurred(engine, deviation, require_engine):
+    """By less than a pixel, which these renderers do, at the size fitted and at a larger one."""
+    require_engine(engine)
+    ellipse = Shape.of("ellipse", (1, 1, 0.5), center=(-0.4, 0), radii=(0.3, 0.2), angle=0.3)
+    disc = Shape.of("circle", (0, 0.2, 0), center=(0.4, 0), radius=0.25)
+    triangle = Shape.of("triangle", (1, 0.2, 0), a=(0.4, -0.15), b=(0.2, 0.1), c=(0.5, 0.1))
+    falloff = deviation / EDGE_DEVIATION / 100
+    scene = Scene(150, 100, tuple(Layer((s,), falloff) for s in (ellipse, disc, triangle)), (0.5, 0.5, 0.5))
+    text = str(small_svg(rounded(scene, GRAINS[0]), Options(), GRAINS[0]).data)
+    assert_as_rendered(engine, text, scene, 41, 0.5)
 
 
 @pytest.mark.parametrize("units", [512, 1024])
