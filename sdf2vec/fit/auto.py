@@ -61,7 +61,12 @@ LEVELS = 3.5 / 255  # by which pixels of one flat colour differ at most
 STEADY = 1.5 / 255  # by which they do of a drawing: photographs have noise
 FLAT = 0.6  # share of pixels next to the same colour, of a drawing in flat colours
 PHOTOGRAPH, STILL_FLAT = 128, 0.58  # pixels squared, and how flat a drawing is there
-DISCS, LEFT = 24, 0.15  # so many discs leave so much of a soft drawing's variance, and more of a photograph's
+DISCS = 24  # of a soft drawing so many discs leave
+LEFT, LITTLE_LEFT = (
+    0.15,
+    0.08,
+)  # this share of its variance; where it is as rough as photographs are, that one
+SMOOTH = 0.6  # share of pixels that are about the mean of those beside them, of what is smooth
 DISC_RESOLUTION = 48
 UNLIKELY = 1.5  # of the most shapes: a picture that needs more is no drawing
 SOFT_MOST = 16  # shapes of a soft drawing
@@ -253,7 +258,14 @@ def _is_soft(picture: Picture) -> bool:
     image = target.flatten(1).median(1).values[:, None, None].expand_as(target).clone()
     before = (image - target).square().mean()
     find_discs(Painted(image, target, torch.ones(target.shape[1:])), DISCS)
-    return bool((image - target).square().mean() <= LEFT * before)
+    left = LEFT if smoothness(picture.premultiplied) >= SMOOTH else LITTLE_LEFT
+    return bool((image - target).square().mean() <= left * before)
+
+
+def smoothness(pixels: np.ndarray) -> float:
+    """The share of pixels [H, W, C] that are the mean of those beside them, to within a level, about."""
+    bent = (np.abs(np.diff(pixels, 2, axis=axis)).max(axis=2, initial=0.0) for axis in (0, 1))
+    return min(share(each <= STEADY) for each in bent)
 
 
 class Drawing:

@@ -6,6 +6,7 @@ from collections.abc import Collection
 from dataclasses import replace
 
 import torch
+from msgspec import structs
 
 from ..image import Picture
 from ..render import fused
@@ -14,17 +15,27 @@ from ..scene import Scene
 from ..units import BACKGROUND, COLOR, Unit
 from .constraints import thicknesses_of
 from .loop import Callback, fit_picture
-from .settings import Settings
+from .settings import Settings, preset_of
 from .views import view_of
 
 RESOLUTION = 512  # pixels squared
 LOSS = 0.002  # of the mean squared error, that rounding may add: less than 0.01 dB
+GOING_ON = 0.5  # of a preset's steps, for a fit that goes on from one of about as many shapes
 UNSEEN = (0.1 / 255) ** 2  # mean squared change of a render that is always allowed: a tenth of a level
 
 
-def fit_concisely(picture: Picture, settings: Settings, callback: Callback) -> Scene:
-    """A fit of so many shapes, with no more digits than it needs."""
-    return concise(fit_picture(picture, settings, callback), picture, settings)
+def fit_concisely(
+    picture: Picture, settings: Settings, callback: Callback, found: Scene | None = None
+) -> Scene:
+    """A fit of so many shapes, with no more digits than it needs.
+
+    `found`: what a fit of about as many came to, or of up to twice or half as many. Going on from it takes half the
+    steps, and comes as near. Not where a fit begins with other short ones, or ends with trials.
+    """
+    preset = None
+    if found and not (len(settings.kinds) > 1 or settings.cuts or settings.trials):
+        settings, preset = structs.replace(settings, start=found), preset_of(settings).paced(GOING_ON)
+    return concise(fit_picture(picture, settings, callback, preset), picture, settings)
 
 
 def concise(scene: Scene, picture: Picture, settings: Settings) -> Scene:

@@ -68,14 +68,19 @@ class Stopped(Exception):  # noqa: N818 (no error)
     """The callback has asked for the end of the fit."""
 
 
-def fit_picture(picture: Picture, settings: Settings, callback: Callback = lambda progress: False) -> Scene:
-    """Fits shapes to a picture. The same settings give the same scene.
+def fit_picture(
+    picture: Picture,
+    settings: Settings,
+    callback: Callback = lambda progress: False,
+    preset: Preset | None = None,
+) -> Scene:
+    """Fits shapes to a picture. The same settings give the same scene. `preset`: in place of theirs.
 
     The callback runs after every step; when it returns True, the fit ends and what is there is returned. Raises
     Sdf2vecError where the start scene does not suit the picture or the settings.
     """
     with threads_of_its_own():
-        fit = Fit(picture, settings, callback)
+        fit = Fit(picture, settings, callback, preset)
         fit.run()
     return fit.scene()
 

@@ -30,6 +30,7 @@ from .surroundings import Surroundings, View
 from .transparency import Overlay, bared, overlays
 
 MOST = 64  # layers that are taken off a picture
+KNOWN = 0.5  # share of it that is flat regions, for any to be
 POINTS = 4000  # at most, at which an outline is looked for
 MARGIN = 0.2, 4  # around a region: share of its longer side, and pixels
 STARTS, BASES = 6, 3  # of a kind of shape; shapes from which others are cut
@@ -90,10 +91,13 @@ def peeled(scene: SceneTensors, views: Sequence[View], search: Search) -> SceneT
     """The scene, which has no layers, with those of a picture that can be told by their outlines.
 
     What has a soft edge is taken off, too, but it is not kept: of which kind it is, its colours tell better.
-    `views`: the picture at the sizes where outlines are looked for, the largest last.
+    None where little of the picture is flat: what regions a photograph has are no outlines. `views`: the picture at
+    the sizes where outlines are looked for, the largest last.
     """
     pixels = views[-1].target.permute(1, 2, 0).numpy().astype(np.float64)
     regions = Regions.of(pixels)
+    if np.mean(regions.labels > 0) < KNOWN:
+        return scene
     outlines = Outlines(scene, [Surroundings.of(scene, 0, view) for view in views], search)
     found: list[Group] = []
     while len(found) < MOST and (top := outlines.topmost(regions)) is not None:

@@ -16,13 +16,13 @@ from .settings import Settings
 SLOPE = 1.7  # dB for twice the shapes, about
 FALL = 0.3  # FLIP falls with this power of their number, about
 STEEP = 1.0, 8.0  # what it is taken for where it is measured
-APART = 1.25  # times so many shapes are needed for that
+APART = 1.35  # times so many shapes are needed for that
 FIRST = 64  # shapes that are tried first
 FAR = 2.0  # times as many or as few shapes, of which these do not tell enough
 PILOT = "fast"  # preset of the fits that foretell
 NEARER = {"balanced": 0.35, "best": 0.6}  # dB that others come nearer to a picture than it, about
 SPARE = 0.25  # dB by which a target is meant to be met
-ENOUGH = 0.45  # dB by which it may be met, for no fewer shapes to be tried
+ENOUGH = 0.5  # dB by which it may be met, for no fewer shapes to be tried
 CLOSE = 1.12  # times the shapes that were too few: nothing between is tried
 TRIES = 4  # fits, before as many shapes are tried as there may be
 
@@ -32,10 +32,12 @@ def meeting(picture: Picture, settings: Settings, callback: Callback) -> tuple[S
     False.
     """
     most = max(settings.most // settings.union, 1)
-    layers, slope = _foretold(picture, settings, callback, most)
-    low, high, best, before = 0, most + 1, None, None
+    layers, slope, before = _foretold(picture, settings, callback, most)
+    low, high, best = 0, most + 1, None
+    scene: Scene | None = None
     for number in range(1, TRIES + 2):
-        scene = fit_concisely(picture, structs.replace(settings, shapes=layers * settings.union), callback)
+        some = structs.replace(settings, shapes=layers * settings.union)
+        scene = fit_concisely(picture, some, callback, scene)
         by = missed(scene, picture, settings)
         if before and max(layers / before[0], before[0] / layers) > APART:
             slope = _steepness(layers, by, *before)
@@ -48,6 +50,7 @@ def meeting(picture: Picture, settings: Settings, callback: Callback) -> tuple[S
         if low == most or (best and (near or number >= TRIES)):
             break
         layers = min(max(_scaled(layers, by, slope), low + 1), high - 1) if best or number < TRIES else most
+    assert scene is not None
     return best or scene, best is not None
 
 
@@ -68,12 +71,16 @@ def wanted(settings: Settings) -> str:
     return " and ".join([*words, *([f"FLIP {flip:g}"] if flip is not None else [])])
 
 
-def _foretold(picture: Picture, settings: Settings, callback: Callback, most: int) -> tuple[int, float]:
-    """With how many layers, at most so many, the target is to be tried first; dB that twice as many are worth."""
+def _foretold(
+    picture: Picture, settings: Settings, callback: Callback, most: int
+) -> tuple[int, float, tuple[int, float] | None]:
+    """With how many layers, at most so many, the target is to be tried first; dB that twice as many are worth; and by
+    how many dB how many layers are about to miss it, where that is known.
+    """
     begun = len(settings.start.layers) if settings.start else 0
     first = min(max(FIRST, 2 * begun), most)
     if settings.preset not in NEARER or begun:
-        return first, SLOPE
+        return first, SLOPE, None
     nearer = NEARER[settings.preset]
     pilot = structs.replace(settings, preset=PILOT, trials=0, cuts=0)
 
@@ -84,10 +91,10 @@ def _foretold(picture: Picture, settings: Settings, callback: Callback, most: in
     by = short_by(first)
     second = min(_scaled(first, by, SLOPE), most)
     if second == most or max(second / first, first / second) <= FAR:
-        return second, SLOPE
+        return second, SLOPE, (first, by)
     again = short_by(second)
     slope = _steepness(second, again, first, by)
-    return min(_scaled(second, again, slope), most), slope
+    return min(_scaled(second, again, slope), most), slope, (second, again)
 
 
 def _steepness(layers: int, by: float, others: int, others_by: float) -> float:

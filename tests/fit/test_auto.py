@@ -273,6 +273,19 @@ def test_a_photograph_is_no_drawing_however_smooth(name):
     picture = load(getattr(data, name)())
     assert auto.flatness(picture.premultiplied) > auto.FLAT
     assert not auto.is_flat(picture)
+    assert auto.is_photograph(picture, flat=False)
+
+
+def test_a_soft_drawing_is_none_even_if_it_is_rough():
+    """As lossy formats leave it; of what is smooth discs may leave more."""
+    y, x = np.mgrid[0:96, 0:128].astype(np.float32)
+    disc = np.exp(-((x - 50) ** 2 + (y - 40) ** 2) / 900)[..., None] * np.array([0.2, 0.6, 0.7], np.float32)
+    rough = disc + np.random.default_rng(0).normal(0, 0.01, disc.shape).astype(np.float32)
+    for pixels in (disc, rough):
+        picture = Picture(np.clip(0.1 + pixels, 0, 1).astype(np.float32))
+        assert not auto.is_photograph(picture, flat=False)
+    assert auto.smoothness(disc) == 1.0
+    assert auto.smoothness(rough) < auto.SMOOTH
 
 
 def test_a_target_is_met_by_fewer_shapes():

@@ -184,6 +184,16 @@ def test_what_no_shape_has_the_outline_of_is_left():
     assert not apart(painted((letter, BLUE, 1.0)))
 
 
+def test_what_is_hardly_flat_anywhere_is_left():
+    """A disc on a flat ground that ends in noise: what regions a photograph has are no drawing."""
+    noise = np.rint(np.random.default_rng(0).random((SIDE, SIDE, 3)) * 255) / 255
+    pixels = painted((disc(30, 30, 14), RED, 1.0))
+    ground = box(0, 0, 60, 60)[::FINER, ::FINER, None]
+    assert len(Regions.of(np.where(ground, pixels, noise)).colors) == 2
+    assert apart(np.where(ground, pixels, noise)) == ()
+    assert len(apart(np.where(ground, pixels, WHITE))) == 1
+
+
 def test_a_soft_disc_is_left_to_be_found_by_its_colours():
     x, y = np.meshgrid(*(np.arange(SIDE) + 0.5,) * 2)
     soft = 1 / (1 + np.exp((np.hypot(x - 40, y - 44) - 20) / 3))

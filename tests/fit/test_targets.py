@@ -16,10 +16,13 @@ DISC = Layer((Shape.of("circle", (1, 0, 0), center=(0, 0), radius=0.2),), 0.1)
 @pytest.fixture
 def fits(monkeypatch):
     """Fits come `near(shapes)` dB near, short ones a little less; which were made."""
-    made = []
+    made: list[tuple[str, int]] = []
 
     def install(near):
-        def fit(picture, settings, callback):
+        def fit(picture, settings, callback, found=None):
+            going_on = len(made) and made[-1][0] != "fast"
+            assert (found is not None) == bool(going_on)
+            assert not found or len(found.layers) == made[-1][1]
             made.append((settings.preset, settings.shapes))
             return Scene(8, 8, (DISC,) * settings.shapes)
 
