@@ -18,11 +18,14 @@ FALL = 0.3  # FLIP falls with this power of their number, about
 STEEP = 1.0, 8.0  # what it is taken for where it is measured
 APART = 1.35  # times so many shapes are needed for that
 FIRST = 64  # shapes that are tried first
-FAR = 2.0  # times as many or as few shapes, of which these do not tell enough
+FAR = 2.0  # times as many or as few shapes, of which these do not tell enough, nor is it gone on from them
 PILOT = "fast"  # preset of the fits that foretell
 NEARER = {"balanced": 0.35, "best": 0.6}  # dB that others come nearer to a picture than it, about
 SPARE = 0.25  # dB by which a target is meant to be met
-ENOUGH = 0.5  # dB by which it may be met, for no fewer shapes to be tried
+ENOUGH, ENOUGH_FLIP = (
+    0.5,
+    0.4,
+)  # dB by which it may be met, for no fewer shapes to be tried; so many of FLIP are 5 %
 CLOSE = 1.12  # times the shapes that were too few: nothing between is tried
 TRIES = 4  # fits, before as many shapes are tried as there may be
 
@@ -33,20 +36,22 @@ def meeting(picture: Picture, settings: Settings, callback: Callback) -> tuple[S
     """
     most = max(settings.most // settings.union, 1)
     layers, slope, before = _foretold(picture, settings, callback, most)
+    enough = ENOUGH if settings.target_flip is None else ENOUGH_FLIP
     low, high, best = 0, most + 1, None
     scene: Scene | None = None
     for number in range(1, TRIES + 2):
         some = structs.replace(settings, shapes=layers * settings.union)
-        scene = fit_concisely(picture, some, callback, scene)
+        near_by = scene is not None and _apart(layers, len(scene.layers)) <= FAR
+        scene = fit_concisely(picture, some, callback, scene if near_by else None)
         by = missed(scene, picture, settings)
-        if before and max(layers / before[0], before[0] / layers) > APART:
+        if before and _apart(layers, before[0]) > APART:
             slope = _steepness(layers, by, *before)
         before = layers, by
         if by > 0.0:
             low = layers
         else:
             high, best = layers, scene
-        near = -ENOUGH <= by <= 0.0 or high <= max(low * CLOSE, low + 1)
+        near = -enough <= by <= 0.0 or high <= max(low * CLOSE, low + 1)
         if low == most or (best and (near or number >= TRIES)):
             break
         layers = min(max(_scaled(layers, by, slope), low + 1), high - 1) if best or number < TRIES else most
@@ -90,11 +95,16 @@ def _foretold(
 
     by = short_by(first)
     second = min(_scaled(first, by, SLOPE), most)
-    if second == most or max(second / first, first / second) <= FAR:
+    if second == most or _apart(first, second) <= FAR:
         return second, SLOPE, (first, by)
     again = short_by(second)
     slope = _steepness(second, again, first, by)
     return min(_scaled(second, again, slope), most), slope, (second, again)
+
+
+def _apart(one: int, other: int) -> float:
+    """How many times as many layers one number is as another, or the other way round."""
+    return max(one, 1) / max(other, 1) if one > other else max(other, 1) / max(one, 1)
 
 
 def _steepness(layers: int, by: float, others: int, others_by: float) -> float:
