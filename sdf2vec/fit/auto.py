@@ -61,11 +61,9 @@ LEVELS = 3.5 / 255  # by which pixels of one flat colour differ at most
 STEADY = 1.5 / 255  # by which they do of a drawing: photographs have noise
 FLAT = 0.6  # share of pixels next to the same colour, of a drawing in flat colours
 PHOTOGRAPH, STILL_FLAT = 128, 0.58  # pixels squared, and how flat a drawing is there
-DISCS = 24  # of a soft drawing so many discs leave
-LEFT, LITTLE_LEFT = (
-    0.15,
-    0.08,
-)  # this share of its variance; where it is as rough as photographs are, that one
+DISCS = 24  # of a soft drawing so many discs leave at most
+LEFT = 0.15  # this share of its variance,
+LITTLE_LEFT = 0.08  # or this, where it is as rough as photographs are
 SMOOTH = 0.6  # share of pixels that are about the mean of those beside them, of what is smooth
 DISC_RESOLUTION = 48
 UNLIKELY = 1.5  # of the most shapes: a picture that needs more is no drawing

@@ -22,10 +22,8 @@ FAR = 2.0  # times as many or as few shapes, of which these do not tell enough, 
 PILOT = "fast"  # preset of the fits that foretell
 NEARER = {"balanced": 0.35, "best": 0.6}  # dB that others come nearer to a picture than it, about
 SPARE = 0.25  # dB by which a target is meant to be met
-ENOUGH, ENOUGH_FLIP = (
-    0.5,
-    0.4,
-)  # dB by which it may be met, for no fewer shapes to be tried; so many of FLIP are 5 %
+ENOUGH = 0.5  # dB by which it may be met, for no fewer shapes to be tried;
+ENOUGH_FLIP = 0.4  # of FLIP, 5 %
 CLOSE = 1.12  # times the shapes that were too few: nothing between is tried
 TRIES = 4  # fits, before as many shapes are tried as there may be
 
