@@ -37,6 +37,7 @@ STARTS, BASES = 6, 3  # of a kind of shape; shapes from which others are cut
 EXACT = 0.36  # pixels by which an outline is off in the mean, at most
 LEAST_OFF = 0.15  # below that an outline is no better
 GOOD = 0.25  # share of a layer that its shape may miss, at most
+GROSSLY = 0.01  # share of it that may be wrong where the largest surroundings show it, by more than an edge
 BITTEN = 0.05  # share of what is cut out of a shape that is beyond its edge: a bite, no hole
 PRICE = 0.04  # of a number, in logarithms of what is missed
 EAGER = 0.25  # how much it matters what is covered too much, where it may be cut away
@@ -138,6 +139,12 @@ class Area:
         missed = wrong / max(float(self.inside.sum()), TINY)
         return Outlined(layer, self.overlay, wrong / self.edge, missed, self._is_bitten(layer), self.soft)
 
+    def gross(self, layer: Group, pixels: int) -> float:
+        """The share of it that a layer covers wrongly in squares of so many pixels: elsewhere its edge is off."""
+        wrong = ((self.cover(layer) * self.known - self.inside).abs() > 0.5).reshape(self.around.shape)
+        squares = ndimage.binary_opening(wrong.numpy(), np.ones((pixels, pixels)))
+        return float(squares.sum()) / max(float(self.inside.sum()), TINY)
+
     def _is_bitten(self, layer: Group) -> bool:
         """Whether a shape that is cut out of another goes beyond its edge."""
         if len(layer.structure) < 2:
@@ -204,7 +211,13 @@ class Outlines:
     def _good(self, tried: Iterable[Overlay], regions: Regions) -> list[Outlined]:
         """Those of some overlays that a shape has the outline of."""
         outlined = (self._of(overlay, regions) for overlay in tried)
-        return [each for each in outlined if each is not None and each.is_good]
+        return [each for each in outlined if each is not None and each.is_good and self._holds(each, regions)]
+
+    def _holds(self, found: Outlined, regions: Regions) -> bool:
+        """Whether a layer covers its overlay in the largest surroundings as well as in those where it was found."""
+        near, fine = self._area(found.overlay, regions), self._area(found.overlay, regions, math.inf)
+        pixels = round(float(near.around.points[2] / fine.around.points[2]))
+        return fine.gross(found.layer, max(pixels, 2)) < GROSSLY
 
     def _of(self, overlay: Overlay, regions: Regions) -> Outlined | None:
         """The shape that comes nearest to an overlay, or a shape with another cut out of it; None for no pixel."""
@@ -214,13 +227,13 @@ class Outlines:
         found = self.done[area.key]
         return replace(found, overlay=overlay) if found else None
 
-    def _area(self, overlay: Overlay, regions: Regions) -> Area:
-        """Where an overlay is, in a window of the largest surroundings in which that has few enough points."""
+    def _area(self, overlay: Overlay, regions: Regions, most: float = POINTS) -> Area:
+        """Where an overlay is, in a window of the largest surroundings in which that has at most so many points."""
         inside, outside = (regions.mask(chosen) for chosen in (overlay.inside, overlay.outside))
         for around in reversed(self.around):
             masks = [_shares(mask, around) for mask in (inside, outside)]
             window = _window(masks[0])
-            if around is self.around[0] or _points(window) <= POINTS:
+            if around is self.around[0] or _points(window) <= most:
                 break
         own, others = (torch.from_numpy(np.ascontiguousarray(mask[window])).flatten() for mask in masks)
         return Area(overlay, own, own + others, around.window(*window), _is_soft(inside, regions))

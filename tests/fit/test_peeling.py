@@ -15,6 +15,7 @@ from sdf2vec.fit.region_graph import Regions
 from sdf2vec.fit.settings import settings_of
 from sdf2vec.fit.surroundings import View
 from sdf2vec.fit.transparency import bared, overlays
+from sdf2vec.fit.views import scaled
 from sdf2vec.image import Picture
 from sdf2vec.render.tensors import SceneTensors, from_scene, to_scene
 from sdf2vec.scene import Layer, Scene, Shape
@@ -182,6 +183,17 @@ def test_a_ring_is_one_layer_and_what_bites_into_a_disc_is_another():
 def test_what_no_shape_has_the_outline_of_is_left():
     letter = box(20, 20, 36, 80) | box(20, 64, 70, 80)
     assert not apart(painted((letter, BLUE, 1.0)))
+
+
+def test_a_hole_of_another_shape_is_seen_where_the_picture_is_large():
+    """A disc with a cross cut out of it: where it is small, a turned box comes near to that."""
+    x, y = points()
+    hole = (np.minimum(abs(x - 48), abs(y - 48)) < 8) & (np.maximum(abs(x - 48), abs(y - 48)) < 22)
+    picture = Picture(painted((disc(48, 48, 38) & ~hole, GREEN, 1.0)).astype(np.float32))
+    sizes = [View(scaled(picture.premultiplied, side), None) for side in (28, SIDE)]
+    bare = SceneTensors([], torch.tensor([*WHITE, 1.0]).float(), "over", (1.0, 1.0))
+    assert peeled(bare, sizes[:1], search_of()).layer_count == 1
+    assert peeled(bare, sizes, search_of()).layer_count == 0
 
 
 def test_what_is_hardly_flat_anywhere_is_left():
