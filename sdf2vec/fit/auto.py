@@ -344,14 +344,19 @@ class Drawing:
 
 
 def ground_of(target: torch.Tensor) -> torch.Tensor:
-    """The most common colour of a picture [C, H, W] where it dominates, else the mean; none where it has holes."""
+    """A colour of a picture [C, H, W] that dominates, that of its rim before the most common, else the mean; none where
+    it has holes.
+    """
     if len(target) == 4:
         return background_of(target) if float(target[3].min()) >= FAINTEST_GROUND else torch.zeros(4)
-    colors = target.flatten(1).T
-    common = common_color(colors, torch.ones(len(colors)))
-    near = (colors - common).abs().amax(1) < LEVELS
-    ground = common if float(near.float().mean()) >= DOMINANT else colors.mean(0)
-    return torch.cat([ground, torch.ones(1)])
+    colors, inner = target.flatten(1).T, torch.zeros(target.shape[1:])
+    inner[1:-1, 1:-1] = 1.0
+    for weights in (1.0 - inner.flatten(), torch.ones(len(colors))):
+        common = common_color(colors, weights)
+        near = (colors - common).abs().amax(1) < LEVELS
+        if float(near.float().mean()) >= DOMINANT:
+            return torch.cat([common, torch.ones(1)])
+    return torch.cat([colors.mean(0), torch.ones(1)])
 
 
 # --- paintings ------------------------------------------------------------------------------------------------

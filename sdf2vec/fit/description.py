@@ -1,7 +1,8 @@
 """How long the description of a picture by a scene is: the minimum description length (Rissanen 1978, Leclerc 1989).
 
-A picture is told by the numbers of a scene, and by how far each of its values is from the render: in whole 8-bit
-levels, at their entropy. So pixels that are right cost next to nothing, however wrong a few at an edge are.
+A picture is told by the numbers of a scene, and by how far each of its values is from the render, in whole 8-bit
+levels, as JPEG tells such differences (ITU-T T.81, F.1.2): a class, which is how many bits the difference has, at its
+entropy; then these bits. So pixels that are right cost next to nothing, and no pattern is cheap that is far off.
 """
 
 from __future__ import annotations
@@ -21,5 +22,7 @@ def description_length(scene: SceneTensors, view: View) -> float:
     """Bits for the scene and for what it leaves of a picture."""
     numbers = sum(len(group.order) * row_width(group.structure) for group in scene.groups)
     levels = (WHITE * residual_of(scene, view)).round()
-    counts = levels.unique(return_counts=True)[1].double()
-    return BITS * numbers - float((counts * (counts / counts.sum()).log2()).sum())
+    classes = levels.abs().add(1).log2().ceil()
+    counts = classes.unique(return_counts=True)[1].double()
+    entropy = -(counts * (counts / counts.sum()).log2()).sum()
+    return BITS * numbers + float(entropy + classes.double().sum())

@@ -15,7 +15,6 @@ import numpy as np
 import torch
 from scipy import ndimage
 from skimage.morphology import convex_hull_image
-from torch.nn.functional import interpolate
 
 from ..arrays import BoolArray
 from ..blend import SUBTRACTION
@@ -28,18 +27,20 @@ from .joining import Search, inserted
 from .region_graph import Regions
 from .surroundings import Surroundings, View
 from .transparency import Overlay, bared, overlays
+from .windows import Part, Sides, larger, means, smaller, widened
 
-MOST = 64  # layers that are taken off a picture
+MOST = 256  # layers that are taken off a picture
 KNOWN = 0.5  # share of it that is flat regions, for any to be
 POINTS = 4000  # at most, at which an outline is looked for
 MARGIN = 0.2, 4  # around a region: share of its longer side, and pixels
 STARTS, BASES = 6, 3  # of a kind of shape; shapes from which others are cut
 EXACT = 0.36  # pixels by which an outline is off in the mean, at most
-LEAST_OFF = 0.15  # below that an outline is no better
+LEAST_OFF, FINELY_OFF = 0.15, 0.08  # below that an outline is no better; in the finest surroundings
 GOOD = 0.25  # share of a layer that its shape may miss, at most
 GROSSLY = 0.01  # share of it that may be wrong where the largest surroundings show it, by more than an edge
+HIDDEN = 0.5  # share of another region, at most, that a layer on top covers
 BITTEN = 0.05  # share of what is cut out of a shape that is beyond its edge: a bite, no hole
-PRICE = 0.04  # of a number, in logarithms of what is missed
+PRICE, DEAR = 0.04, 0.15  # of a number, in logarithms of what is missed; of shapes that are all good
 EAGER = 0.25  # how much it matters what is covered too much, where it may be cut away
 LIKELY, STEPS = 3, 10  # structures whose outlines are sharpened in the end; steps of each
 HOPEFUL = 3.0  # pixels by which these are off
@@ -63,8 +64,12 @@ class Outlined:
 
     @property
     def score(self) -> float:
-        """What is the less the better: each number has its price."""
-        return math.log(max(self.off, LEAST_OFF)) + PRICE * row_width(self.layer.structure)
+        """What is the less the better."""
+        return self.priced(LEAST_OFF, PRICE)
+
+    def priced(self, least: float, price: float) -> float:
+        """The same where it is no better that an outline is off by less than the least, and each number has a price."""
+        return math.log(max(self.off, least)) + price * row_width(self.layer.structure)
 
     @property
     def is_good(self) -> bool:
@@ -77,10 +82,19 @@ class Outlined:
         return len(self.layer.structure) > 1
 
     @property
+    def is_opaque(self) -> bool:
+        return self.overlay.opacity == 1.0
+
+    @property
     def rank(self) -> tuple[bool, bool, int, float]:
         """What is the less the likelier: of translucent layers what explains the most regions is."""
-        opaque = self.overlay.opacity == 1.0
-        return self.bitten, self.is_joined, 0 if opaque else -int(self.overlay.inside.sum()), self.score
+        covered = 0 if self.is_opaque else -int(self.overlay.inside.sum())
+        return self.bitten, self.is_joined, covered, self.score
+
+    @property
+    def is_plain(self) -> bool:
+        """Whether it is one opaque shape."""
+        return self.is_opaque and not self.is_joined
 
     def lies_under(self, other: Outlined) -> bool:
         """Whether another one shows what is under it where this one is."""
@@ -101,10 +115,12 @@ def peeled(scene: SceneTensors, views: Sequence[View], search: Search) -> SceneT
         return scene
     outlines = Outlines(scene, [Surroundings.of(scene, 0, view) for view in views], search)
     found: list[Group] = []
-    while len(found) < MOST and (top := outlines.topmost(regions)) is not None:
-        found += [] if top.soft else [top.layer]
-        opaque = top.overlay.opacity == 1.0
-        regions = regions.hidden(top.overlay.inside) if opaque else bared(regions, top.overlay)
+    while len(found) < MOST and (top := outlines.topmost(regions)):
+        found += [each.layer for each in top if not each.soft]
+        if top[0].is_opaque:
+            regions = regions.hidden(np.any([each.overlay.inside for each in top], axis=0))
+        else:
+            regions = bared(regions, top[0].overlay)
     for layer in reversed(found):
         scene = inserted(scene, replace(layer, order=torch.tensor([scene.layer_count])))
     return scene
@@ -117,6 +133,7 @@ class Area:
     overlay: Overlay
     inside: torch.Tensor
     known: torch.Tensor
+    part: Part  # of the surroundings, that window
     around: Surroundings
     soft: bool  # its edge
 
@@ -129,9 +146,11 @@ class Area:
 
     @property
     def edge(self) -> float:
-        """The length of its outline in pixels."""
-        inside = (self.inside > 0.5).reshape(self.around.shape).numpy()
-        return float(max((inside & ~ndimage.binary_erosion(inside)).sum(), 1))
+        """The length of its outline in pixels, where it is known."""
+        inside, known = (
+            (mask > 0.5).reshape(self.around.shape).numpy() for mask in (self.inside, self.known)
+        )
+        return float(max((inside & ndimage.binary_dilation(known & ~inside)).sum(), 1))
 
     def outlined(self, layer: Group) -> Outlined:
         """How well a layer covers it."""
@@ -193,8 +212,8 @@ class Outlines:
     search: Search
     done: dict[tuple[bytes, ...], Outlined | None] = field(default_factory=dict)
 
-    def topmost(self, regions: Regions) -> Outlined | None:
-        """The layer that lies on top of some regions; None where none is told.
+    def topmost(self, regions: Regions) -> list[Outlined]:
+        """The layer that lies on top of some regions, of plain ones all that are no neighbours; none if none is told.
 
         Another shape where one is bitten is the likelier: bites wait until there is nothing else.
         """
@@ -206,37 +225,61 @@ class Outlines:
         for whole in (True, False):
             if all(each.bitten for each in found):
                 found += self._good(opaque(regions, self.scene.background.numpy(), whole), regions)
-        return min(found, key=lambda each: each.rank, default=None)
+        return _apart(sorted(found, key=lambda each: each.rank), regions)
 
     def _good(self, tried: Iterable[Overlay], regions: Regions) -> list[Outlined]:
         """Those of some overlays that a shape has the outline of."""
-        outlined = (self._of(overlay, regions) for overlay in tried)
-        return [each for each in outlined if each is not None and each.is_good and self._holds(each, regions)]
+        found = []
+        for overlay in tried:
+            area, fine = self._area(overlay, regions), self._area(overlay, regions, math.inf)
+            best = self._of(area, fine)
+            if best is not None and best.is_good and _holds(best.layer, area, fine, regions):
+                found.append(replace(best, overlay=overlay))
+        return found
 
-    def _holds(self, found: Outlined, regions: Regions) -> bool:
-        """Whether a layer covers its overlay in the largest surroundings as well as in those where it was found."""
-        near, fine = self._area(found.overlay, regions), self._area(found.overlay, regions, math.inf)
-        pixels = round(float(near.around.points[2] / fine.around.points[2]))
-        return fine.gross(found.layer, max(pixels, 2)) < GROSSLY
-
-    def _of(self, overlay: Overlay, regions: Regions) -> Outlined | None:
+    def _of(self, area: Area, fine: Area) -> Outlined | None:
         """The shape that comes nearest to an overlay, or a shape with another cut out of it; None for no pixel."""
-        area = self._area(overlay, regions)
-        if area.key not in self.done:
-            self.done[area.key] = _outlined(area, self.search)
-        found = self.done[area.key]
-        return replace(found, overlay=overlay) if found else None
+        key = (*area.key, *fine.key)
+        if key not in self.done:
+            self.done[key] = _outlined(area, fine, self.search)
+        return self.done[key]
 
     def _area(self, overlay: Overlay, regions: Regions, most: float = POINTS) -> Area:
         """Where an overlay is, in a window of the largest surroundings in which that has at most so many points."""
-        inside, outside = (regions.mask(chosen) for chosen in (overlay.inside, overlay.outside))
+        sides, own = (regions.labels.shape[0], regions.labels.shape[1]), regions.extent(overlay.inside)
         for around in reversed(self.around):
-            masks = [_shares(mask, around) for mask in (inside, outside)]
-            window = _window(masks[0])
+            window = _with_margin(smaller(own, sides, around.shape), around.shape)
             if around is self.around[0] or _points(window) <= most:
                 break
-        own, others = (torch.from_numpy(np.ascontiguousarray(mask[window])).flatten() for mask in masks)
-        return Area(overlay, own, own + others, around.window(*window), _is_soft(inside, regions))
+        part = larger(window, sides, around.shape)
+        inside, others = (
+            torch.from_numpy(means(regions.mask(chosen, part), window, sides, around.shape)).flatten()
+            for chosen in (overlay.inside, overlay.outside)
+        )
+        soft = _is_soft(overlay.inside, widened(own, 2, sides), regions)
+        return Area(overlay, inside, inside + others, window, around.window(*window), soft)
+
+
+def _apart(ranked: Sequence[Outlined], regions: Regions) -> list[Outlined]:
+    """The first, and if that is plain, all others that are so and no neighbours of each other."""
+    taken, touched = list(ranked[:1]), np.zeros(len(regions.colors), bool)
+    for each in ranked if taken and taken[0].is_plain else ():
+        inside = each.overlay.inside
+        if not each.is_plain or (touched & inside).any():
+            continue
+        taken += [] if each is taken[0] else [each]
+        touched |= inside | regions.beside[inside].any(axis=0)
+    return taken
+
+
+def _holds(layer: Group, area: Area, fine: Area, regions: Regions) -> bool:
+    """Whether a layer covers its overlay in the finest surroundings as well as where it was found, and nothing else."""
+    pixels = EXACT * float(area.around.points[2] / fine.around.points[2])
+    if fine.gross(layer, max(round(pixels) + 1, 2)) >= GROSSLY:
+        return False
+    covered = (fine.cover(layer) > 0.5).reshape(fine.around.shape).numpy()
+    hidden = np.bincount(regions.labels[fine.part][covered], minlength=len(regions.areas) + 1)[1:]
+    return not ((hidden > HIDDEN * regions.areas) & ~fine.overlay.inside).any()
 
 
 def opaque(regions: Regions, ground: np.ndarray, whole: bool) -> Iterator[Overlay]:
@@ -267,53 +310,48 @@ def _linked(number: int, alike: BoolArray, regions: Regions) -> BoolArray:
     return linked
 
 
-def _shares(mask: BoolArray, around: Surroundings) -> np.ndarray:
-    """The share of each pixel of some surroundings [H, W] that a mask, perhaps finer, covers."""
-    finer = torch.from_numpy(mask)[None, None].float()
-    return interpolate(finer, size=around.shape, mode="area")[0, 0].numpy()
-
-
-def _window(shares: np.ndarray) -> tuple[slice, slice]:
-    """Rows and columns around what is covered, with a margin."""
-    found = ndimage.find_objects((shares > 0).astype(int))
-    if not found:
-        return slice(0, 1), slice(0, 1)
+def _with_margin(part: Part, sides: Sides) -> Part:
+    """What is around a part, too."""
     share, pixels = MARGIN
-    margin = round(share * max(each.stop - each.start for each in found[0])) + pixels
-    rows, columns = (
-        slice(max(each.start - margin, 0), min(each.stop + margin, size))
-        for each, size in zip(found[0], shares.shape, strict=True)
-    )
-    return rows, columns
+    return widened(part, round(share * max(each.stop - each.start for each in part)) + pixels, sides)
 
 
-def _is_soft(inside: BoolArray, regions: Regions) -> bool:
-    """Whether most of an edge goes over into others by colours that no region has."""
+def _is_soft(chosen: BoolArray, part: Part, regions: Regions) -> bool:
+    """Whether most of the edge of some regions [R], around which a part goes, goes over into others by colours that no
+    region has.
+    """
+    inside = regions.mask(chosen, part)
     edge = inside & ~ndimage.binary_erosion(inside, border_value=1)
-    return bool((edge & ndimage.binary_dilation(~regions.sure)).sum() > 0.5 * edge.sum())
+    return bool((edge & ndimage.binary_dilation(~regions.sure[part])).sum() > 0.5 * edge.sum())
 
 
-def _points(window: tuple[slice, slice]) -> int:
+def _points(window: Part) -> int:
     rows, columns = window
     return int((rows.stop - rows.start) * (columns.stop - columns.start))
 
 
-def _outlined(area: Area, search: Search) -> Outlined | None:
-    """The best that shapes of all kinds come to; None where there is less than a pixel."""
+def _outlined(area: Area, fine: Area, search: Search) -> Outlined | None:
+    """The best that shapes of all kinds come to, of those that are good what is so in the finest surroundings, too;
+    None where there is less than a pixel.
+    """
     proposer = search.proposer(area.around)
     plain = _single(area, area.opening(), proposer) if area.inside.max() > 0.5 else []
     if not plain:
         return None
-    best = _sharpest(plain, area, proposer)
-    if best.is_good:
-        return best
+    ranked = _sharpest(plain, area, proposer)
+    good = _distinct([each for each in ranked if each.is_good])[:LIKELY]
+    if good:
+        mask = fine.opening().mask
+        exact = [proposer.sharpened(each.layer, mask, fine.around, STEPS) for each in good]
+        return area.outlined(min(exact, key=lambda layer: fine.outlined(layer).priced(FINELY_OFF, DEAR)))
+    best = ranked[0]
     wide = sorted(_single(area, area.opening(EAGER), proposer), key=lambda each: _eager(each, area))
     cut = [
         area.outlined(tried.layer)
         for base in _distinct(wide)[:BASES]
         for tried in proposer.candidates([area.cut(base.layer)], area.around)[0]
     ]
-    return _sharpest([best, *cut], area, proposer)
+    return _sharpest([best, *cut], area, proposer)[0]
 
 
 def _distinct(ranked: Sequence[Outlined]) -> list[Outlined]:
@@ -324,8 +362,8 @@ def _distinct(ranked: Sequence[Outlined]) -> list[Outlined]:
     return list(found.values())
 
 
-def _sharpest(tried: Sequence[Outlined], area: Area, proposer: Proposer) -> Outlined:
-    """The best of the likeliest structures, after some steps of their outlines."""
+def _sharpest(tried: Sequence[Outlined], area: Area, proposer: Proposer) -> list[Outlined]:
+    """The best first, the likeliest structures after some steps of their outlines."""
     likely = _distinct(sorted(tried, key=lambda each: each.score))[:LIKELY]
     mask = area.opening().mask
     sharp = [
@@ -333,7 +371,7 @@ def _sharpest(tried: Sequence[Outlined], area: Area, proposer: Proposer) -> Outl
         for each in likely
         if each.off < HOPEFUL
     ]
-    return min([*tried, *sharp], key=lambda each: each.score)
+    return sorted([*tried, *sharp], key=lambda each: each.score)
 
 
 def _single(area: Area, opening: Opening, proposer: Proposer) -> list[Outlined]:

@@ -12,10 +12,11 @@ from scipy.sparse import coo_matrix
 from scipy.sparse.csgraph import connected_components
 
 from ..arrays import BoolArray, Float64Array, IntArray
+from .windows import NOWHERE, Part, extent, moved
 
 STEADY, EVEN = 1.5 / 255, 4.0 / 255  # how far neighbours of a flat region differ at most; and any two of it
 LEAST = 6  # pixels of a region
-MOST = 80  # regions, the largest
+MOST = 320  # regions, the largest
 REACH, SURELY = (
     4.0,
     2.0,
@@ -76,9 +77,23 @@ class Regions:
         """Pixels of each, [R]."""
         return np.bincount(self.labels.ravel(), minlength=len(self.colors) + 1)[1:]
 
-    def mask(self, chosen: BoolArray) -> BoolArray:
-        """Where some of them [R] surely are, [H, W]."""
-        return np.concatenate([[False], chosen])[self.labels] & self.sure
+    @cached_property
+    def boxes(self) -> list[Part]:
+        """The part of the picture that each is in."""
+        return [box or NOWHERE for box in ndimage.find_objects(self.labels, len(self.colors))]
+
+    def mask(self, chosen: BoolArray, part: Part) -> BoolArray:
+        """Where some of them [R] surely are, in a part of the picture."""
+        return np.concatenate([[False], chosen])[self.labels[part]] & self.sure[part]
+
+    def extent(self, chosen: BoolArray) -> Part:
+        """The part of the picture that some of them [R] surely are in."""
+        boxes = [self.boxes[index] for index in np.flatnonzero(chosen)] or [NOWHERE]
+        rows, columns = (
+            slice(min(box[axis].start for box in boxes), max(box[axis].stop for box in boxes))
+            for axis in (0, 1)
+        )
+        return moved(extent(self.mask(chosen, (rows, columns))), (rows, columns))
 
     def recolored(self, chosen: BoolArray, colors: Float64Array, doubts: Float64Array) -> Regions:
         """The same where some [R] have other colours; neighbours that have come to be alike are one."""

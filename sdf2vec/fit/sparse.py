@@ -372,14 +372,14 @@ def pruned(
     scene: SceneTensors, sizes: Sizes, search: Search, worst: float = FLOOR, hope: Hope = USUAL
 ) -> SceneTensors:
     """The scene without layers that it does as well without, or stays within the worst mean squared error."""
-    error = error_of(scene, sizes.joint)
+    limit = max(NEEDLESS * error_of(scene, sizes.joint), worst)
     while scene.layer_count:
-        limit = max(NEEDLESS * error, worst)
         fewer = _bare(scene, sizes, search, limit, hope) if hope.softness else None
         fewer = fewer or _fewer(scene, sizes, search, limit, hope)
         if fewer is None:
             return scene
         scene, error = fewer
+        limit = min(limit, max(NEEDLESS * error, worst))
     return scene
 
 

@@ -260,6 +260,15 @@ def test_what_is_found_far_from_a_drawing_is_fitted_from_nothing_too(error, begu
     assert len(made.layers) == begun[-1]
 
 
+def test_a_chessboard_is_not_given_up_for_a_pattern_that_is_cheap_to_tell():
+    """Its squares are boxes, or triangles: one circle, 6 dB from it, is not what it is made of."""
+    row, column = np.mgrid[:96, :128] // 16
+    pixels = np.repeat(((row + column) % 2).astype(np.float32)[..., None], 3, axis=2)
+    scene = fit(pixels, seed=0)
+    assert quality(scene, Picture(pixels)).psnr > 28
+    assert kinds_of(scene) == ["box"] * 24
+
+
 def test_what_is_no_drawing_gets_as_many_shapes_as_are_allowed():
     found = fitted(noise(), max_shapes=12, preset="fast")
     assert found.scene.shape_count == 12
@@ -343,6 +352,9 @@ def test_the_ground_is_the_colour_that_dominates():
     target = np.full((3, 20, 20), 0.9, np.float32)
     target[:, :8] = 0.1
     assert np.allclose(ground_of(torch.from_numpy(target))[:3], 0.9, atol=1e-6)
+    tiles = np.full((3, 20, 20), 0.9, np.float32)
+    tiles[:, ::5], tiles[:, :, ::5], tiles[:, -1], tiles[:, :, -1] = 0.1, 0.1, 0.1, 0.1
+    assert np.allclose(ground_of(torch.from_numpy(tiles))[:3], 0.1, atol=1e-6)  # less of it, but around all
     assert ground_of(torch.zeros(4, 5, 5)).tolist() == [0.0] * 4
     corner = torch.ones(4, 5, 5)
     corner[:, 0, 0] = 0.0

@@ -129,7 +129,7 @@ def test_a_translucent_layer_over_two_colours_is_told_with_its_opacity_and_colou
     (overlay,) = overlays(regions)
     assert overlay.opacity == pytest.approx(0.4, abs=0.01)
     assert overlay.color == pytest.approx(RED, abs=0.02)
-    assert regions.mask(overlay.inside).sum() == 56 * 36
+    assert regions.mask(overlay.inside, np.s_[:, :]).sum() == 56 * 36
 
 
 def test_without_it_the_two_colours_are_left():
@@ -194,6 +194,58 @@ def test_a_hole_of_another_shape_is_seen_where_the_picture_is_large():
     bare = SceneTensors([], torch.tensor([*WHITE, 1.0]).float(), "over", (1.0, 1.0))
     assert peeled(bare, sizes[:1], search_of()).layer_count == 1
     assert peeled(bare, sizes, search_of()).layer_count == 0
+
+
+def dots(across, down, radius):
+    """Middles and a mask of so many dots all over the picture."""
+    middles = [
+        ((i + 0.5) * SIDE / across, (j + 0.5) * SIDE / down) for i in range(across) for j in range(down)
+    ]
+    return middles, np.any([disc(x, y, radius) for x, y in middles], axis=0)
+
+
+def test_ninety_dots_are_ninety_circles():
+    middles, mask = dots(10, 9, 3.2)
+    layers = apart(painted((mask, BLUE, 1.0)))
+    found = np.array([layer.shapes[0].parameters for layer in layers])
+    assert [layer.shapes[0].kind for layer in layers] == ["circle"] * 90
+    away = np.abs(found[:, None, :2] - (np.array(middles) / SIDE - 0.5)).max(axis=2)
+    assert sorted(away.argmin(axis=1)) == list(range(90))
+    assert away.min(axis=1).max() < 0.3 / SIDE
+    assert found[:, 2] == pytest.approx(3.2 / SIDE, abs=0.3 / SIDE)
+
+
+def test_a_field_lies_under_the_small_dots_on_it():
+    """However little of it they hide: laid on top, it would hide them."""
+    _, mask = dots(3, 3, 3.0)
+    under, *over = apart(painted((box(10, 10, 86, 86), BLUE, 1.0), (mask, RED, 1.0)))
+    assert under.shapes[0].kind == "box"
+    assert [layer.shapes[0].kind for layer in over] == ["circle"] * 9
+
+
+def test_stripes_from_side_to_side_are_boxes():
+    """Where the picture is small, wide ellipses come as near."""
+    stripes = np.any([box(-1, top, SIDE + 1, top + 16) for top in (7, 38, 70)], axis=0)
+    picture = Picture(painted((stripes, BLUE, 1.0)).astype(np.float32))
+    sizes = [View(scaled(picture.premultiplied, side), None) for side in (24, SIDE)]
+    bare = SceneTensors([], torch.tensor([*WHITE, 1.0]).float(), "over", (1.0, 1.0))
+    layers = to_scene(peeled(bare, sizes, search_of()), SIDE, SIDE).layers
+    assert [layer.shapes[0].kind for layer in layers] == ["box"] * 3
+
+
+def test_layers_that_are_worth_little_each_are_not_all_taken_out():
+    """A large part of the picture is missing, so that one dot of 36 hardly matters."""
+    middles, mask = dots(6, 6, 3.0)
+    view = view_of(painted((box(0, 0, 30, SIDE), RED, 1.0), (mask, BLUE, 1.0)))
+    blue = tuple(map(float, BLUE))
+    layers = tuple(
+        Layer((Shape.of("circle", blue, center=(x / SIDE - 0.5, y / SIDE - 0.5), radius=3 / SIDE),))
+        for x, y in middles
+    )
+    scene = from_scene(Scene(SIDE, SIDE, layers, (1.0, 1.0, 1.0)))
+    sizes = sparse.Sizes(view, view, view)
+    left = sparse.pruned(scene, sizes, search_of())
+    assert sparse.error_of(left, view) <= 1.06 * sparse.error_of(scene, view)
 
 
 def test_what_is_hardly_flat_anywhere_is_left():
