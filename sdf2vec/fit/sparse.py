@@ -43,6 +43,7 @@ UNSEEN = 0.5 / 255  # coverage
 HELPS = 0.92  # of the error before, at most, after as many rounds as there is patience for
 PATIENCE, CLOSE = 2, 10**-3.9  # rounds; mean squared error, 39 dB, below which there is none for a second
 NEEDLESS = 1.05  # how much the error may rise by a layer taken out, after a descent
+LITTLE = 0.25  # at most, by this share of what a layer explains in the mean
 THROUGH = 0.1  # of the error that a cut could take away where the picture is transparent, at least, for a try
 WORST = 0.1  # of all that is wrong, where a layer is whose shapes are exchanged
 PROMISING = (
@@ -372,14 +373,15 @@ def pruned(
     scene: SceneTensors, sizes: Sizes, search: Search, worst: float = FLOOR, hope: Hope = USUAL
 ) -> SceneTensors:
     """The scene without layers that it does as well without, or stays within the worst mean squared error."""
-    limit = max(NEEDLESS * error_of(scene, sizes.joint), worst)
+    error, bare = error_of(scene, sizes.joint), error_of(replace(scene, groups=[]), sizes.joint)
     while scene.layer_count:
+        little = LITTLE * max(bare - error, 0.0) / scene.layer_count
+        limit = max(error + min((NEEDLESS - 1.0) * error, little), worst)
         fewer = _bare(scene, sizes, search, limit, hope) if hope.softness else None
         fewer = fewer or _fewer(scene, sizes, search, limit, hope)
         if fewer is None:
             return scene
         scene, error = fewer
-        limit = min(limit, max(NEEDLESS * error, worst))
     return scene
 
 

@@ -237,9 +237,15 @@ def test_layers_that_are_worth_little_each_are_not_all_taken_out():
     """A large part of the picture is missing, so that one dot of 36 hardly matters."""
     middles, mask = dots(6, 6, 3.0)
     view = view_of(painted((box(0, 0, 30, SIDE), RED, 1.0), (mask, BLUE, 1.0)))
-    blue = tuple(map(float, BLUE))
+    red, green, blue = map(float, BLUE)
     layers = tuple(
-        Layer((Shape.of("circle", blue, center=(x / SIDE - 0.5, y / SIDE - 0.5), radius=3 / SIDE),))
+        Layer(
+            (
+                Shape.of(
+                    "circle", (red, green, blue), center=(x / SIDE - 0.5, y / SIDE - 0.5), radius=3 / SIDE
+                ),
+            )
+        )
         for x, y in middles
     )
     scene = from_scene(Scene(SIDE, SIDE, layers, (1.0, 1.0, 1.0)))
