@@ -219,8 +219,8 @@ def test_a_field_lies_under_the_few_small_dots_on_it():
     """However little of it they hide: laid on top, it would hide them."""
     mask = disc(30, 34, 2.8) | disc(66, 58, 2.8)
     under, *over = apart(painted((box(10, 10, 86, 86), BLUE, 1.0), (mask, RED, 1.0)))
-    assert under.shapes[0].kind == "box"
-    assert [layer.shapes[0].kind for layer in over] == ["circle"] * 2
+    assert under.shapes[0].color == pytest.approx(BLUE, abs=0.01)
+    assert [layer.shapes[0].color for layer in over] == [pytest.approx(RED, abs=0.01)] * 2
 
 
 def test_stripes_from_side_to_side_are_boxes():
