@@ -260,15 +260,6 @@ def test_what_is_found_far_from_a_drawing_is_fitted_from_nothing_too(error, begu
     assert len(made.layers) == begun[-1]
 
 
-def test_a_chessboard_is_not_given_up_for_a_pattern_that_is_cheap_to_tell():
-    """Its squares are boxes, or triangles: one circle, 6 dB from it, is not what it is made of."""
-    row, column = np.mgrid[:96, :128] // 16
-    pixels = np.repeat(((row + column) % 2).astype(np.float32)[..., None], 3, axis=2)
-    scene = fit(pixels, seed=0)
-    assert quality(scene, Picture(pixels)).psnr > 28
-    assert kinds_of(scene) == ["box"] * 24
-
-
 def test_what_is_no_drawing_gets_as_many_shapes_as_are_allowed():
     found = fitted(noise(), max_shapes=12, preset="fast")
     assert found.scene.shape_count == 12
