@@ -349,9 +349,9 @@ def ground_of(target: torch.Tensor) -> torch.Tensor:
     """
     if len(target) == 4:
         return background_of(target) if float(target[3].min()) >= FAINTEST_GROUND else torch.zeros(4)
-    colors, inner = target.flatten(1).T, torch.zeros(target.shape[1:])
-    inner[1:-1, 1:-1] = 1.0
-    for weights in (1.0 - inner.flatten(), torch.ones(len(colors))):
+    colors, rim = target.flatten(1).T, torch.ones(target.shape[1:])
+    rim[1:-1, 1:-1] = 0.0
+    for weights in (rim.flatten(), torch.ones(len(colors))):
         common = common_color(colors, weights)
         near = (colors - common).abs().amax(1) < LEVELS
         if float(near.float().mean()) >= DOMINANT:

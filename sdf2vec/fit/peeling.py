@@ -133,7 +133,7 @@ class Area:
     overlay: Overlay
     inside: torch.Tensor
     known: torch.Tensor
-    part: Part  # of the surroundings, that window
+    part: Part  # that window of the surroundings
     around: Surroundings
     soft: bool  # its edge
 
@@ -231,7 +231,7 @@ class Outlines:
         """Those of some overlays that a shape has the outline of."""
         found = []
         for overlay in tried:
-            area, fine = self._area(overlay, regions), self._area(overlay, regions, math.inf)
+            area, fine = self._areas(overlay, regions)
             best = self._of(area, fine)
             if best is not None and best.is_good and _holds(best.layer, area, fine, regions):
                 found.append(replace(best, overlay=overlay))
@@ -244,31 +244,39 @@ class Outlines:
             self.done[key] = _outlined(area, fine, self.search)
         return self.done[key]
 
-    def _area(self, overlay: Overlay, regions: Regions, most: float = POINTS) -> Area:
-        """Where an overlay is, in a window of the largest surroundings in which that has at most so many points."""
-        sides, own = (regions.labels.shape[0], regions.labels.shape[1]), regions.extent(overlay.inside)
-        for around in reversed(self.around):
-            window = _with_margin(smaller(own, sides, around.shape), around.shape)
-            if around is self.around[0] or _points(window) <= most:
-                break
-        part = larger(window, sides, around.shape)
-        inside, others = (
-            torch.from_numpy(means(regions.mask(chosen, part), window, sides, around.shape)).flatten()
-            for chosen in (overlay.inside, overlay.outside)
-        )
+    def _areas(self, overlay: Overlay, regions: Regions) -> tuple[Area, Area]:
+        """Where an overlay is, in a window of the largest surroundings in which that has at most `POINTS` points, and
+        in one of the finest.
+        """
+        sides, own = regions.sides, regions.extent(overlay.inside)
         soft = _is_soft(overlay.inside, widened(own, 2, sides), regions)
-        return Area(overlay, inside, inside + others, window, around.window(*window), soft)
+        windows = [_with_margin(smaller(own, sides, around.shape), around.shape) for around in self.around]
+        near = max((i for i, window in enumerate(windows) if _points(window) <= POINTS), default=0)
+
+        def area(index: int) -> Area:
+            around, window = self.around[index], windows[index]
+            part = larger(window, sides, around.shape)
+            inside, others = (
+                torch.from_numpy(means(regions.mask(chosen, part), window, sides, around.shape)).flatten()
+                for chosen in (overlay.inside, overlay.outside)
+            )
+            return Area(overlay, inside, inside + others, window, around.window(*window), soft)
+
+        fine = area(len(windows) - 1)
+        return fine if near == len(windows) - 1 else area(near), fine
 
 
 def _apart(ranked: Sequence[Outlined], regions: Regions) -> list[Outlined]:
     """The first, and if that is plain, all others that are so and no neighbours of each other."""
-    taken, touched = list(ranked[:1]), np.zeros(len(regions.colors), bool)
-    for each in ranked if taken and taken[0].is_plain else ():
+    if not ranked or not ranked[0].is_plain:
+        return list(ranked[:1])
+    taken: list[Outlined] = []
+    touched = np.zeros(len(regions.colors), bool)
+    for each in ranked:
         inside = each.overlay.inside
-        if not each.is_plain or (touched & inside).any():
-            continue
-        taken += [] if each is taken[0] else [each]
-        touched |= inside | regions.beside[inside].any(axis=0)
+        if each.is_plain and not (touched & inside).any():
+            taken.append(each)
+            touched |= inside | regions.beside[inside].any(axis=0)
     return taken
 
 

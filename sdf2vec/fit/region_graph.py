@@ -12,7 +12,7 @@ from scipy.sparse import coo_matrix
 from scipy.sparse.csgraph import connected_components
 
 from ..arrays import BoolArray, Float64Array, IntArray
-from .windows import NOWHERE, Part, extent, moved
+from .windows import NOWHERE, Part, Sides, extent, moved
 
 STEADY, EVEN = 1.5 / 255, 4.0 / 255  # how far neighbours of a flat region differ at most; and any two of it
 LEAST = 6  # pixels of a region
@@ -76,6 +76,12 @@ class Regions:
     def areas(self) -> IntArray:
         """Pixels of each, [R]."""
         return np.bincount(self.labels.ravel(), minlength=len(self.colors) + 1)[1:]
+
+    @property
+    def sides(self) -> Sides:
+        """Of the picture."""
+        height, width = self.labels.shape
+        return height, width
 
     @cached_property
     def boxes(self) -> list[Part]:

@@ -51,10 +51,11 @@ def painted(*layers, ground=WHITE):
     return np.rint(means * 255) / 255
 
 
-def apart(pixels):
-    """The layers that are told by their outlines, from the bottom up, lengths in pixels."""
+def apart(pixels, *sides):
+    """The layers that are told by their outlines, from the bottom up; where the picture is seen at these sizes, too."""
     bare = SceneTensors([], torch.tensor([*WHITE, 1.0]).float(), "over", (1.0, 1.0))
-    return to_scene(peeled(bare, [view_of(pixels)], search_of()), SIDE, SIDE).layers
+    small = [View(scaled(pixels.astype(np.float32), side), None) for side in sides]
+    return to_scene(peeled(bare, [*small, view_of(pixels)], search_of()), SIDE, SIDE).layers
 
 
 def view_of(pixels):
@@ -227,10 +228,7 @@ def test_a_field_lies_under_what_little_is_on_it():
 def test_stripes_from_side_to_side_are_boxes():
     """Where the picture is small, wide ellipses come as near."""
     stripes = np.any([box(-1, top, SIDE + 1, top + 16) for top in (7, 38, 70)], axis=0)
-    picture = Picture(painted((stripes, BLUE, 1.0)).astype(np.float32))
-    sizes = [View(scaled(picture.premultiplied, side), None) for side in (24, SIDE)]
-    bare = SceneTensors([], torch.tensor([*WHITE, 1.0]).float(), "over", (1.0, 1.0))
-    layers = to_scene(peeled(bare, sizes, search_of()), SIDE, SIDE).layers
+    layers = apart(painted((stripes, BLUE, 1.0)), 24)
     assert [layer.shapes[0].kind for layer in layers] == ["box"] * 3
 
 
@@ -238,17 +236,7 @@ def test_layers_that_are_worth_little_each_are_not_all_taken_out():
     """A large part of the picture is missing, so that one dot of 36 hardly matters."""
     middles, mask = dots(6, 6, 3.0)
     view = view_of(painted((box(0, 0, 30, SIDE), RED, 1.0), (mask, BLUE, 1.0)))
-    red, green, blue = map(float, BLUE)
-    layers = tuple(
-        Layer(
-            (
-                Shape.of(
-                    "circle", (red, green, blue), center=(x / SIDE - 0.5, y / SIDE - 0.5), radius=3 / SIDE
-                ),
-            )
-        )
-        for x, y in middles
-    )
+    layers = tuple(sharp_disc(BLUE, x, y, 3) for x, y in middles)
     scene = from_scene(Scene(SIDE, SIDE, layers, (1.0, 1.0, 1.0)))
     sizes = sparse.Sizes(view, view, view)
     left = sparse.pruned(scene, sizes, search_of())
@@ -303,10 +291,10 @@ def test_edges_stay_sharp_where_much_is_missing():
     assert sparse.softer(sharp, view, search_of()) is sharp
 
 
-def sharp_disc(color, x, y):
+def sharp_disc(color, x, y, radius=20):
     center = x / SIDE - 0.5, y / SIDE - 0.5
     red, green, blue = map(float, color)
-    return Layer((Shape.of("circle", (red, green, blue), center=center, radius=20 / SIDE),))
+    return Layer((Shape.of("circle", (red, green, blue), center=center, radius=radius / SIDE),))
 
 
 @pytest.mark.parametrize(("most", "layers"), [(2, 2), (1, 0)])

@@ -76,12 +76,15 @@ def at_rate(times, seed=0):
 
 
 def test_steps_thirty_times_too_large_are_survived_and_said():
-    """Usual steps end at 44 to 47 dB, wild ones without going back at 11 to 14."""
-    _, said = at_rate(1.0)
-    assert said == []
-    wild, said = at_rate(30.0)
-    assert "ran away" in said[0]
-    assert psnr_of(wild, picture()) > 30.0
+    """Without going back: 11 to 14 dB. Two seeds of three, for one of them may be unlucky."""
+    lost = []
+    for seed in range(3):
+        usual, said = at_rate(1.0, seed)
+        assert said == []
+        wild, said = at_rate(30.0, seed)
+        assert "ran away" in said[0]
+        lost.append(psnr_of(usual, picture()) - psnr_of(wild, picture()))
+    assert sorted(lost)[1] < 8.0
 
 
 def test_derivatives_that_are_no_numbers_move_nothing(monkeypatch):
