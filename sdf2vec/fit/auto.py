@@ -33,7 +33,9 @@ from .matching_pursuit import Painted, find_discs
 from .offers import common_color
 from .one_more import gain_of_one_more
 from .ramps import grounded
+from .repainting import KIND, ground_shade, repainted
 from .settings import AUTO, Settings, preset_of
+from .shading import Shade, Shading
 from .simplify import sharing, simplified
 from .sparse import (
     FLOOR,
@@ -134,6 +136,20 @@ def _few(picture: Picture, settings: Settings, callback: Callback) -> Fitted | N
     flat = is_flat(picture)
     if not _is_searched(picture, settings, flat):
         return None
+    shading = Shading.of(picture) if flat else None
+    if shading is None:
+        return _searched(picture, settings, callback, flat)
+    ground = _ground_shade(shading, settings)
+    fewer = settings if ground is None else _one_less(settings)
+    found = _searched(shading.flattened, fewer, callback, flat)
+    if found is None:
+        return None
+    scene = concise(repainted(found.scene, shading, ground), picture, settings)
+    return _told(scene, picture, settings)
+
+
+def _searched(picture: Picture, settings: Settings, callback: Callback, flat: bool) -> Fitted | None:
+    """The same of a picture without gradients, `flat` or not."""
     drawing = Drawing(picture, settings, callback, flat)
     found = drawing.found()
     if drawing.stopped:
@@ -155,6 +171,20 @@ def _few(picture: Picture, settings: Settings, callback: Callback) -> Fitted | N
     if settings.shapes == AUTO or (settings.shapes == found.shape_count and settings.loss is None):
         made.append(found)
     return _told(_nearest(made, picture), picture, settings)
+
+
+def _ground_shade(shading: Shading, settings: Settings) -> Shade | None:
+    """The gradient of a picture's ground, if it has one, and one more shape may show it."""
+    ground = ground_of(scaled(shading.flattened.premultiplied, JOINT))
+    shade = ground_shade(ground, shading)
+    return shade if settings.most > 1 and KIND in settings.drawn_kinds else None
+
+
+def _one_less(settings: Settings) -> Settings:
+    """The settings of a fit with one shape less."""
+    if settings.shapes == AUTO:
+        return structs.replace(settings, max_shapes=settings.most - 1)
+    return structs.replace(settings, shapes=settings.shapes - 1)
 
 
 def _enough(picture: Picture, settings: Settings, found: Scene, view: View, callback: Callback) -> Scene:

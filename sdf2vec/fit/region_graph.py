@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import combinations, product
@@ -40,7 +41,9 @@ class Regions:
     @classmethod
     def of(cls, pixels: Float64Array) -> Regions:
         """Those of a picture [H, W, C]; what lies between them is of the nearest."""
-        parts = _connected(pixels, _calm(pixels))
+        parts = connected(
+            _calm(pixels), lambda one, other: np.abs(pixels[one] - pixels[other]).max(axis=2) <= STEADY
+        )
         sizes = np.bincount(parts.ravel())
         sizes[0] = 0
         labels, sure, colors = np.zeros_like(parts), np.zeros(parts.shape, bool), []
@@ -153,18 +156,20 @@ def _calm(pixels: Float64Array) -> BoolArray:
     return calm
 
 
-def _connected(pixels: Float64Array, calm: BoolArray) -> IntArray:
-    """Numbers from 1 of what is connected, by neighbours of about one colour, where a picture is calm; else 0."""
-    numbers = np.arange(calm.size).reshape(calm.shape)
+def connected(chosen: BoolArray, alike: Callable[[Part, Part], BoolArray]) -> IntArray:
+    """Numbers from 1 of what is connected, by neighbours that are alike, where something is chosen [H, W]; else 0.
+
+    `alike`: whether the pixels of a part of the picture are like those of another, one by one.
+    """
+    numbers = np.arange(chosen.size).reshape(chosen.shape)
     pairs = []
-    for one, other in ((np.s_[:, 1:], np.s_[:, :-1]), (np.s_[1:], np.s_[:-1])):
-        alike = np.abs(pixels[one] - pixels[other]).max(axis=2) <= STEADY
-        alike &= calm[one] & calm[other]
-        pairs.append(np.stack([numbers[one][alike], numbers[other][alike]]))
+    for one, other in ((np.s_[:, 1:], np.s_[:, :-1]), (np.s_[1:, :], np.s_[:-1, :])):
+        joined = alike(one, other) & chosen[one] & chosen[other]
+        pairs.append(np.stack([numbers[one][joined], numbers[other][joined]]))
     ends = np.concatenate(pairs, axis=1)
-    graph = coo_matrix((np.ones(ends.shape[1], bool), ends), shape=(calm.size, calm.size))
+    graph = coo_matrix((np.ones(ends.shape[1], bool), ends), shape=(chosen.size, chosen.size))
     _, found = connected_components(graph, directed=False)
-    return np.where(calm, found.reshape(calm.shape).astype(np.int64) + 1, 0)
+    return np.where(chosen, found.reshape(chosen.shape).astype(np.int64) + 1, 0)
 
 
 def _shared_out(pixels: Float64Array, cores: IntArray, colors: Float64Array) -> tuple[IntArray, BoolArray]:

@@ -19,36 +19,9 @@ from sdf2vec.fit.views import scaled
 from sdf2vec.image import Picture
 from sdf2vec.render.tensors import SceneTensors, from_scene, to_scene
 from sdf2vec.scene import Layer, Scene, Shape
+from tests.fit.drawn import BLUE, FINER, GREEN, RED, SIDE, WHITE, box, disc, painted, points
 
-WHITE, BLUE, RED, GREEN = (
-    np.array(c) for c in ((1, 1, 1), (0.1, 0.2, 0.8), (0.9, 0.1, 0.1), (0.2, 0.7, 0.3))
-)
-SIDE, FINER = 96, 4
 KINDS = ("circle", "ellipse", "box", "triangle")
-
-
-def points():
-    """Pixels' samples x, y [n, n]."""
-    return np.meshgrid(*((np.arange(SIDE * FINER) + 0.5) / FINER,) * 2)
-
-
-def disc(x, y, radius):
-    across, down = points()
-    return np.hypot(across - x, down - y) < radius
-
-
-def box(left, top, right, bottom):
-    x, y = points()
-    return (x > left) & (x < right) & (y > top) & (y < bottom)
-
-
-def painted(*layers, ground=WHITE):
-    """A picture [H, W, 3] of masks in colours and opacities, sixteen samples a pixel, in 8 bits."""
-    image = np.broadcast_to(ground, (SIDE * FINER, SIDE * FINER, 3)).astype(float)
-    for mask, color, opacity in layers:
-        image = image + (opacity * mask)[..., None] * (color - image)
-    means = image.reshape(SIDE, FINER, SIDE, FINER, 3).mean(axis=(1, 3))
-    return np.rint(means * 255) / 255
 
 
 def apart(pixels, *sides):

@@ -1,0 +1,118 @@
+"""Gradients put into the shapes that were found in a picture without them: what `shading` took out of it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+from functools import cache
+
+import numpy as np
+import torch
+
+from ..arrays import Float64Array
+from ..graph import components_of
+from ..layer import P
+from ..lower.numpy import Arrays, compile_numpy
+from ..render.reference import canvas, layers_at
+from ..render.tensors import SceneTensors, from_scene
+from ..scene import Layer, Scene, Shape
+from ..shapes import KINDS
+from .shading import Shade, Shading
+
+PAINT, KIND = "linear", "box"
+LOOKED = 128  # pixels squared, at which is told which regions are seen of a layer
+NEAR = 0.1  # how far a channel of its colour may be from that of the region
+OPAQUE = 0.9  # at least
+MARGIN = 0.1  # scene units by which a box under all is larger than the canvas
+UNSEEN = 3.0 / 255  # change of a colour from a shape's middle to its edge that is not worth a gradient
+LEAST = 0.5  # share of that way on which it changes, at least: there may be no such colours farther on
+TINY = 1e-6
+
+
+def repainted(scene: Scene, shading: Shading, ground: Shade | None) -> Scene:
+    """A scene that is near to a picture without its gradients, with these: in layers of which the region of one is
+    seen, and in a box under all that shows the ground's, where it has one.
+    """
+    tensors = from_scene(scene)
+    layers = [
+        _painted(layer, _shade_of(layer, seen, shading), tensors.size)
+        for layer, seen in zip(scene.layers, _seen(tensors, shading), strict=True)
+    ]
+    below = [] if ground is None else [Layer((_graded(_over_all(tensors.size), ground, tensors.size),))]
+    return replace(scene, layers=(*below, *layers))
+
+
+def ground_shade(ground: torch.Tensor, shading: Shading) -> Shade | None:
+    """The gradient that a ground [4] of the picture without any is in place of, if it is one."""
+    near = (shading.shades[number - 1] for number in shading.graded)
+    return next((shade for shade in near if _is_near(shade, ground[:3].tolist())), None)
+
+
+def _seen(scene: SceneTensors, shading: Shading) -> Float64Array:
+    """How much is seen of each layer in each region, [L, R], in draw order."""
+    labels = shading.nearest(LOOKED)
+    height, width = labels.shape
+    within = np.eye(len(shading.shades) + 1)[labels.ravel()][:, 1:]
+    if not scene.groups:
+        return np.zeros((0, within.shape[1]))
+    covers, _ = layers_at(scene, *canvas(scene, width, height))
+    order = torch.cat([group.order for group in scene.groups]).argsort()
+    opacities = torch.cat([group.opacity for group in scene.groups])[order]
+    own = (covers * opacities).double().numpy()
+    above = np.cumprod(np.concatenate([np.ones_like(own[:1]), 1.0 - own[:0:-1]]), axis=0)[::-1]
+    found: Float64Array = (own * above) @ within
+    return found
+
+
+def _shade_of(layer: Layer, seen: Float64Array, shading: Shading) -> Shade | None:
+    """The gradient of the region [R] in which most is seen of a layer, if that is one and it has its colour."""
+    number = int(seen.argmax()) + 1
+    if number not in shading.graded or layer.opacity < OPAQUE:
+        return None
+    shade = shading.shades[number - 1]
+    return shade if _is_near(shade, layer.shapes[0].color) else None
+
+
+def _is_near(shade: Shade, color: Sequence[float]) -> bool:
+    return bool(np.abs(shade.color[:3] - color).max() < NEAR)
+
+
+def _painted(layer: Layer, shade: Shade | None, size: tuple[float, float]) -> Layer:
+    """A layer whose first shape has a gradient; as it is without one."""
+    if shade is None:
+        return layer
+    return replace(layer, shapes=(_graded(layer.shapes[0], shade, size), *layer.shapes[1:]))
+
+
+def _over_all(size: tuple[float, float]) -> Shape:
+    """A box that covers the canvas, which has this size in scene units."""
+    half = tuple(side / 2 + MARGIN for side in size)
+    return Shape.of(KIND, center=(0.0, 0.0), half_size=half, angle=0.0, corner_radius=0.0)
+
+
+def _graded(shape: Shape, shade: Shade, size: tuple[float, float]) -> Shape:
+    """A shape that shows a gradient on a canvas of this size, as far as there are such colours."""
+    middle, right, down = (
+        np.array(_frame(shape.kind)(*shape.parameters, *point)) for point in ((0, 0), (1, 0), (0, 1))
+    )
+    back = np.linalg.inv(np.stack([right - middle, down - middle], axis=1))  # from the frame to the scene
+    place = (shade.place - 0.5) * size
+    slopes = shade.slopes[:, :3] / np.array(size)[:, None]
+    axes, strengths, changes = np.linalg.svd(back.T @ slopes, full_matrices=False)
+    axis, change = axes[:, 0], strengths[0] * changes[0]
+    color = (shade.color[:3] + (back @ -middle - place) @ slopes).clip(0.0, 1.0)
+    room = float((np.minimum(color, 1.0 - color) / np.maximum(np.abs(change), TINY)).min())
+    extent = float(np.abs(axis).sum())
+    if extent * np.abs(change).max() <= UNSEEN:
+        return replace(shape, color=tuple(color.tolist()))
+    reach = min(max(room, LEAST * extent), extent)
+    ends = ((color + way * reach * change).clip(0.0, 1.0) for way in (-1, 1))
+    first, last, direction = (tuple(values.tolist()) for values in (*ends, axis / (2 * reach)))
+    return Shape.of(shape.kind, first, PAINT, **shape.named(), color_end=last, direction=direction)
+
+
+@cache
+def _frame(kind: str) -> Callable[..., Arrays]:
+    """A point in the frame in which a shape is painted, from the shape's numbers and the point."""
+    own = KINDS[kind]
+    return compile_numpy([own.frame(*own.variables()).at(P)], [*own.scalars(), *components_of(P)])

@@ -1,0 +1,235 @@
+"""Gradients of a picture, taken out of it: shapes that run from one colour to another are searched in one colour.
+
+Where a region of the picture is a plane in its colours, all of it gets the colour of its middle, and what lies beside
+it or on it stays: the picture is flat then. `repainting` puts the gradients into the shapes that were found.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass
+from functools import cached_property
+from typing import NamedTuple
+
+import numpy as np
+from scipy import ndimage
+
+from ..arrays import BoolArray, Float32Array, IntArray
+from ..image import Picture, unpremultiply
+from .region_graph import MOST, connected
+from .views import scaled
+from .windows import Part, Sides, extent, larger, widened
+
+WHITE = 255  # levels
+LOOKED = 320  # pixels squared, at which regions are looked for
+BENT, STEEP = 2.2 / 255, 16.0 / 255  # second differences of what is even, at most; first ones
+PLANE, NEARLY = 2.2 / 255, 0.98  # how far a region is from a plane at most; share of it that is as near
+SMALLEST = 3  # pixels of a side, for anything to be even
+LEAST, LEAST_SHADED = 9, 60  # pixels of a region; of one that is no single colour
+CHANGES = 6.0 / 255  # of a colour across a region, at least, of a gradient
+ALIKE = 3.0 / 255  # how far two regions of one plane are from it, at most
+REACH = 3  # pixels beyond a region that its edge may show in
+AROUND = 5  # pixels squared where an edge goes from one colour to the other
+NOISE = 3.0 / 255  # length of the difference of two colours that are one
+UNLIKE = 6.0 / 255  # from the region's colour, of an edge's other one
+SHARP = 0.7  # share of what lies beyond a region's edge that is another region, at least
+
+EVERYWHERE: Part = slice(None), slice(None)
+
+
+class Shade(NamedTuple):
+    """A premultiplied colour [C] at a place (x, y) and its slopes along both axes [2, C], by shares of the sides."""
+
+    place: Float32Array
+    color: Float32Array
+    slopes: Float32Array
+
+    @property
+    def is_flat(self) -> bool:
+        """Whether it is one colour."""
+        return not self.slopes.any()
+
+    @property
+    def flat(self) -> Float32Array:
+        """The colour [C] that is in its place where there are no gradients, of 8 bits."""
+        found: Float32Array = (np.rint(self.color * WHITE) / WHITE).astype(np.float32)
+        return found
+
+    def at(self, x: Float32Array, y: Float32Array) -> Float32Array:
+        """The colour there [..., C]."""
+        found: Float32Array = (
+            self.color
+            + (x - self.place[0])[..., None] * self.slopes[0]
+            + (y - self.place[1])[..., None] * self.slopes[1]
+        )
+        return found
+
+
+@dataclass(frozen=True)
+class Shading:
+    """The regions of a picture, by number from 1, 0 for none [H, W], where it is small; and what they are painted with.
+
+    Parts of one colour or gradient are one region, wherever they are.
+    """
+
+    picture: Picture
+    labels: IntArray
+    shades: tuple[Shade, ...]
+
+    @classmethod
+    def of(cls, picture: Picture) -> Shading | None:
+        """That of a picture; None where no region of it is a gradient with sharp edges."""
+        pixels = scaled(picture.premultiplied, LOOKED).permute(1, 2, 0).numpy()
+        labels, shades = _regions(pixels)
+        found = cls(picture, labels, tuple(shades))
+        return found if found.graded else None
+
+    @cached_property
+    def graded(self) -> list[int]:
+        """The numbers of the regions that are gradients with sharp edges."""
+        numbers = (number for number, shade in enumerate(self.shades, 1) if not shade.is_flat)
+        return [number for number in numbers if _is_sharp(self.labels, number)]
+
+    def nearest(self, resolution: int) -> IntArray:
+        """The number of the region that each pixel of a smaller picture is in or next to, [h, w]."""
+        _, (rows, columns) = ndimage.distance_transform_edt(self.labels == 0, return_indices=True)
+        scale = min(1.0, resolution / math.sqrt(self.labels.size))
+        height, width = (max(round(side * scale), 1) for side in self.labels.shape)
+        chosen = _resized(self.labels.shape, (height, width))
+        found: IntArray = self.labels[rows[chosen], columns[chosen]]
+        return found
+
+    @cached_property
+    def flattened(self) -> Picture:
+        """The picture without its gradients: each of the colour that is in its middle."""
+        before = self.picture.premultiplied
+        flat = before.copy()
+        for number in self.graded:
+            part, near = self._around(number, before.shape[:2])
+            _flatten(self.shades[number - 1], before, flat, part, near)
+        flat = flat.clip(0.0, 1.0)
+        return Picture(unpremultiply(flat) if self.picture.has_alpha else flat)
+
+    def _around(self, number: int, sides: Sides) -> tuple[Part, BoolArray]:
+        """A part of the picture, at its own size, that holds a region and its edge; and where that may be in it."""
+        small = self.labels.shape
+        inside = ndimage.binary_dilation(self.labels == number, iterations=REACH)
+        part = larger(widened(extent(inside), 1, small), sides, small)
+        return part, inside[_resized(small, sides, part)]
+
+
+def _flatten(shade: Shade, before: Float32Array, flat: Float32Array, part: Part, inside: BoolArray) -> None:
+    """Takes a gradient out of a part of a picture [H, W, C]."""
+    shown = shade.at(*_places(before.shape[:2], part))
+    apart = np.linalg.norm(before[part] - shown, axis=2)
+    near = ndimage.maximum_filter(inside & (apart <= UNLIKE), 2 * REACH + 1)
+    flat[part] += _share(apart, near)[..., None] * (shade.flat - shown)
+    flat[part][near & (apart <= NOISE)] = shade.flat
+
+
+def _places(sides: Sides, part: Part = EVERYWHERE) -> tuple[Float32Array, Float32Array]:
+    """Where the pixels of a part of a picture are, x [1, w] and y [h, 1], by shares of its sides."""
+    y, x = (
+        ((np.arange(side)[seen] + 0.5) / side).astype(np.float32)
+        for side, seen in zip(sides, part, strict=True)
+    )
+    return x[None], y[:, None]
+
+
+def _resized(sides: Sides, wanted: Sides, part: Part = EVERYWHERE) -> tuple[IntArray, IntArray]:
+    """Which rows [h, 1] and columns [1, w] of a picture are seen in a part of one of other sides."""
+    rows, columns = (
+        np.arange(new)[seen] * own // new for own, new, seen in zip(sides, wanted, part, strict=True)
+    )
+    return rows[:, None], columns[None]
+
+
+def _share(apart: Float32Array, near: BoolArray) -> Float32Array:
+    """How much of each pixel [H, W] a region has: all where its colour is shown, none where what is nearby is shown
+    that is least like it.
+    """
+    most = ndimage.maximum_filter(apart, AROUND)
+    share = np.where(most <= UNLIKE, 1.0, 1.0 - apart / np.maximum(most, UNLIKE))
+    found: Float32Array = (near * share.clip(0.0, 1.0)).astype(np.float32)
+    return found
+
+
+def _is_sharp(labels: IntArray, number: int) -> bool:
+    """Whether other regions begin where a region ends, or it goes on."""
+    inside = labels == number
+    within = ndimage.binary_dilation(inside, np.ones((3, 3)), iterations=REACH)
+    beyond = ndimage.binary_dilation(within, np.ones((3, 3))) & ~within
+    return not beyond.any() or float((labels[beyond] > 0).mean()) >= SHARP
+
+
+# --- regions --------------------------------------------------------------------------------------------------
+
+
+def _regions(pixels: Float32Array) -> tuple[IntArray, list[Shade]]:
+    """The regions of a picture [H, W, C] that are planes, by number from 1, and what these are, the largest first."""
+    labels, shades = np.zeros(pixels.shape[:2], np.int64), list[Shade]()
+    x, y = np.broadcast_arrays(*_places(pixels.shape[:2]))
+    for inside in _planes(pixels):
+        shade = _shade(x[inside], y[inside], pixels[inside])
+        if shade is None:
+            continue
+        same = (
+            number
+            for number, other in enumerate(shades, 1)
+            if other.is_flat == shade.is_flat
+            and np.abs(other.at(x[inside], y[inside]) - pixels[inside]).max(axis=1).mean() < ALIKE
+        )
+        number = next(same, len(shades) + 1)
+        if number > len(shades):
+            shades.append(shade)
+        labels[inside] = number
+    return labels, shades
+
+
+def _planes(pixels: Float32Array) -> Iterator[BoolArray]:
+    """Masks [H, W] of connected pixels of a picture where colours hardly bend, and change the same way; the largest
+    first.
+    """
+    if min(pixels.shape[:2]) < SMALLEST:
+        return
+    even = _even(pixels)
+    slopes = np.concatenate([np.gradient(pixels, axis=axis) for axis in (0, 1)], axis=2)
+    parts = connected(even, lambda one, other: np.abs(slopes[one] - slopes[other]).max(axis=2) <= BENT)
+    sizes = np.bincount(parts.ravel())
+    sizes[0] = 0
+    for number in np.argsort(-sizes, kind="stable")[:MOST]:
+        if sizes[number] >= LEAST:
+            yield parts == number
+
+
+def _even(pixels: Float32Array) -> BoolArray:
+    """Where a picture [H, W, C] hardly bends, and is not steep, from a pixel to all of those around it."""
+    even = np.zeros(pixels.shape[:2], bool)
+    middle = pixels[1:-1, 1:-1]
+    bent: Float32Array = np.zeros_like(middle[..., 0])
+    steep = bent
+    for one, other in (
+        (pixels[1:-1, :-2], pixels[1:-1, 2:]),
+        (pixels[:-2, 1:-1], pixels[2:, 1:-1]),
+        (pixels[:-2, :-2], pixels[2:, 2:]),
+        (pixels[:-2, 2:], pixels[2:, :-2]),
+    ):
+        bent = np.maximum(bent, np.abs(one + other - 2 * middle).max(axis=2))
+        steep = np.maximum(steep, np.abs(one - other).max(axis=2) / 2)
+    even[1:-1, 1:-1] = (bent <= BENT) & (steep <= STEEP)
+    return even
+
+
+def _shade(x: Float32Array, y: Float32Array, colors: Float32Array) -> Shade | None:
+    """The plane through colours [P, C], where they are one, and no paler here than there."""
+    places = np.stack([x, y], axis=1)
+    middle, mean = places.mean(axis=0), colors.mean(axis=0)
+    slopes: Float32Array = np.linalg.lstsq(places - middle, colors - mean)[0]
+    change = (places - middle) @ slopes
+    if np.mean(np.abs(mean + change - colors).max(axis=1) <= PLANE) < NEARLY:
+        return None
+    if np.ptp(change, axis=0).max() < CHANGES:
+        return Shade(middle, np.median(colors, axis=0), np.zeros_like(slopes))
+    fades = colors.shape[1] == 4 and np.ptp(colors[:, 3]) > CHANGES
+    return None if fades or len(colors) < LEAST_SHADED else Shade(middle, mean, slopes)

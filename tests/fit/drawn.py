@@ -1,0 +1,39 @@
+"""Pictures of 96 × 96 pixels drawn in numpy, by sixteen samples each: no renderer of this program has a part in it."""
+
+import numpy as np
+
+WHITE, BLUE, RED, GREEN = (
+    np.array(c) for c in ((1, 1, 1), (0.1, 0.2, 0.8), (0.9, 0.1, 0.1), (0.2, 0.7, 0.3))
+)
+SIDE, FINER = 96, 4
+
+
+def points():
+    """Pixels' samples x, y [n, n]."""
+    return np.meshgrid(*((np.arange(SIDE * FINER) + 0.5) / FINER,) * 2)
+
+
+def disc(x, y, radius):
+    across, down = points()
+    return np.hypot(across - x, down - y) < radius
+
+
+def box(left, top, right, bottom):
+    x, y = points()
+    return (x > left) & (x < right) & (y > top) & (y < bottom)
+
+
+def painted(*layers, ground=WHITE, finer=FINER):
+    """A picture [H, W, 3] of masks in colours and opacities, in 8 bits; four times as large where not `finer`."""
+    image = np.broadcast_to(ground, (SIDE * FINER, SIDE * FINER, 3)).astype(float)
+    for mask, color, opacity in layers:
+        image = image + (opacity * mask)[..., None] * (color - image)
+    side = SIDE * FINER // finer
+    means = image.reshape(side, finer, side, finer, 3).mean(axis=(1, 3))
+    return np.rint(means * 255) / 255
+
+
+def ramp(middle, rise):
+    """Colours [n, n, 3] of all samples that rise from the left to the right; one in the middle."""
+    x, _ = points()
+    return middle + (x / SIDE - 0.5)[..., None] * rise

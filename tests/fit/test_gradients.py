@@ -1,0 +1,76 @@
+"""Drawings with gradients, drawn by resvg: what a shape runs through is its paint, no pile of shapes."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from sdf2vec import fit, fitted
+from sdf2vec.engines import resvg
+from sdf2vec.image import Picture
+from sdf2vec.quality import quality
+
+SIDE = 128
+GRADIENT = (
+    '<linearGradient id="g" x1="0" y1="0" x2="1" y2="1"><stop stop-color="#f06"/>'
+    '<stop offset="1" stop-color="#06f"/></linearGradient>'
+)
+WHITE = '<rect width="100%" height="100%" fill="white"/>'
+BADGE = (
+    '<rect x="20" y="24" width="88" height="80" fill="url(#g)"/><circle cx="70" cy="60" r="22" fill="#fff"/>'
+)
+GROUND = '<rect width="100%" height="100%" fill="url(#g)"/>'
+DISCS = '<circle cx="40" cy="46" r="20" fill="#fff"/><circle cx="88" cy="80" r="24" fill="#fd0"/>'
+
+
+@pytest.fixture
+def drawn(require_engine):
+    require_engine("resvg")
+
+    def draw(shapes):
+        text = (
+            f'<svg xmlns="http://www.w3.org/2000/svg" width="{SIDE}" height="{SIDE}">{GRADIENT}{shapes}</svg>'
+        )
+        pixels = resvg.render(text, SIDE, SIDE)
+        opaque = bool((pixels[..., 3] == 1.0).all())
+        return Picture(np.ascontiguousarray(pixels[..., : 3 if opaque else 4], dtype=np.float32))
+
+    return draw
+
+
+def paints_of(scene):
+    return [layer.shapes[0].paint for layer in scene.layers]
+
+
+@pytest.mark.parametrize("ground", [WHITE, ""], ids=["on white", "on nothing"])
+def test_a_badge_is_a_box_with_a_gradient_and_a_disc(ground, drawn):
+    picture = drawn(ground + BADGE)
+    found = fitted(picture)
+    assert sorted(shape.kind for layer in found.scene.layers for shape in layer.shapes) == ["box", "circle"]
+    assert paints_of(found.scene)[0] == "linear"
+    assert quality(found.scene, picture).psnr >= 40
+    assert found.reason.startswith("2 shapes")
+
+
+@pytest.mark.parametrize("shapes", ["auto", 3, 6])
+def test_the_gradient_of_a_ground_counts_as_a_shape(shapes, drawn):
+    picture = drawn(GROUND + DISCS)
+    scene = fit(picture, shapes)
+    assert scene.shape_count == (3 if shapes == "auto" else shapes)
+    assert paints_of(scene)[0] == "linear"
+    assert quality(scene, picture).psnr >= 38
+
+
+def test_what_a_user_does_not_allow_has_no_part_in_it(drawn):
+    scene = fit(drawn(GROUND + DISCS), kind="circle", max_shapes=8)
+    assert {shape.kind for layer in scene.layers for shape in layer.shapes} <= {"circle"}
+    assert scene.shape_count <= 8
+
+
+def test_a_target_is_measured_on_the_picture_itself(drawn):
+    picture = drawn(GROUND + DISCS)
+    found = fitted(picture, target_psnr=36)
+    assert found.met
+    assert quality(found.scene, picture).psnr >= 36
+    assert found.reason.startswith("3 shapes")
+    assert "36 dB is reached" in found.reason

@@ -1,0 +1,121 @@
+"""Gradients put into layers: what comes out is the picture, which was drawn in numpy; what has none stays."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+import torch
+
+from sdf2vec.fit.repainting import ground_shade, repainted
+from sdf2vec.fit.shading import Shading
+from sdf2vec.image import Picture
+from sdf2vec.render import reference
+from sdf2vec.scene import Joint, Layer, Scene, Shape
+from tests.fit.drawn import RED, SIDE, WHITE, box, disc, painted, points, ramp
+
+HALF, RISE = np.array([0.5, 0.3, 0.5]), np.array([0.4, 0.2, -0.4])
+WHERE: dict[str, Any] = {"center": ((50 - 48) / SIDE, (44 - 48) / SIDE)}  # that disc in scene units
+BOX: dict[str, Any] = {"half_size": (30 / SIDE, 20 / SIDE), "corner_radius": 0.0, "angle": 0.4}
+
+
+def shading_of(pixels):
+    return Shading.of(Picture(pixels.astype(np.float32)))
+
+
+def shown(scene):
+    return reference.render(scene, SIDE, SIDE)[:3].permute(1, 2, 0).numpy()
+
+
+def middle_color(shading, x=50, y=44):
+    """Of the flattened picture."""
+    return tuple(shading.flattened.pixels[y, x].tolist())
+
+
+def turned_box(x, y, half, angle):
+    across, down = points()
+    along = np.cos(angle) * (across - x) + np.sin(angle) * (down - y)
+    beside = np.cos(angle) * (down - y) - np.sin(angle) * (across - x)
+    return (np.abs(along) < half[0]) & (np.abs(beside) < half[1])
+
+
+@pytest.mark.parametrize(
+    ("mask", "kind", "numbers"),
+    [
+        (disc(50, 44, 30), "circle", {"radius": 30 / SIDE}),
+        (turned_box(50, 44, (30, 20), 0.4), "box", BOX),
+    ],
+)
+def test_a_shape_gets_the_gradient_of_its_region(mask, kind, numbers):
+    """Down and across, of another strength in each channel; a turned box has a frame of its own."""
+    x, y = points()
+    colors = HALF + ((0.8 * x + 0.6 * y) / SIDE - 0.5)[..., None] * RISE
+    pixels = painted((mask, colors, 1.0))
+    shading = shading_of(pixels)
+    flat = Scene(
+        SIDE, SIDE, (Layer((Shape.of(kind, middle_color(shading), **WHERE, **numbers),)),), (1, 1, 1)
+    )
+    assert np.abs(shown(flat) - pixels).max() > 0.1
+    made = repainted(flat, shading, None)
+    (layer,) = made.layers
+    assert layer.shapes[0].paint == "linear"
+    assert np.abs(shown(made) - pixels)[36:52, 40:60].max() < 0.01
+    assert np.abs(shown(made) - pixels).mean() < 0.003
+
+
+@pytest.mark.parametrize(
+    ("color", "opacity", "center"),
+    [(RED, 1.0, (0.02, -0.04)), (None, 0.5, (0.02, -0.04)), (None, 1.0, (-0.4, -0.4))],
+    ids=["another colour", "translucent", "elsewhere"],
+)
+def test_other_layers_keep_their_colour(color, opacity, center):
+    shading = shading_of(painted((disc(50, 44, 30), ramp(HALF, RISE), 1.0)))
+    own = middle_color(shading) if color is None else tuple(color)
+    layer = Layer((Shape.of("circle", own, center=center, radius=0.08),), opacity=opacity)
+    scene = Scene(SIDE, SIDE, (layer,), (1, 1, 1))
+    assert repainted(scene, shading, None) == scene
+
+
+def test_a_small_shape_gets_the_colour_that_is_there():
+    shading = shading_of(painted((disc(50, 44, 30), ramp(HALF, RISE), 1.0)))
+    dot = Shape.of("circle", middle_color(shading), center=(20 / SIDE, 0.0), radius=2 / SIDE)
+    (layer,) = repainted(Scene(SIDE, SIDE, (Layer((dot,)),), (1, 1, 1)), shading, None).layers
+    assert layer.shapes[0].paint == "flat"
+    assert layer.shapes[0].color == pytest.approx(HALF + RISE * 20 / SIDE, abs=0.005)
+
+
+def test_what_is_hidden_has_no_part_in_it():
+    """A circle most of which lies under a white box, where it is drawn alone at its left."""
+    shading = shading_of(painted((disc(50, 44, 30), ramp(HALF, RISE), 1.0), (box(30, 0, 96, 96), WHITE, 1.0)))
+    circle = Shape.of("circle", middle_color(shading, 26), **WHERE, radius=30 / SIDE)
+    cover = Shape.of("box", (1, 1, 1), center=(0.3125, 0), half_size=(0.5, 0.6), angle=0, corner_radius=0)
+    made = repainted(Scene(SIDE, SIDE, (Layer((circle,)), Layer((cover,))), (1, 1, 1)), shading, None)
+    assert [layer.shapes[0].paint for layer in made.layers] == ["linear", "flat"]
+
+
+def test_what_is_cut_out_stays_cut_out():
+    ring = disc(50, 44, 30) & ~disc(50, 44, 14)
+    shading = shading_of(painted((ring, ramp(HALF, RISE), 1.0)))
+    outer, inner = (Shape.of("circle", middle_color(shading, 28), **WHERE, radius=r / SIDE) for r in (30, 14))
+    scene = Scene(SIDE, SIDE, (Layer((outer, inner), joints=(Joint("subtraction", 0.0),)),), (1, 1, 1))
+    (layer,) = repainted(scene, shading, None).layers
+    assert [shape.paint for shape in layer.shapes] == ["linear", "flat"]
+    assert layer.joints == scene.layers[0].joints
+
+
+def test_a_ground_with_a_gradient_is_a_box_under_all():
+    pixels = painted((box(0, 0, SIDE, SIDE), ramp(HALF, RISE), 1.0), (disc(30, 30, 16), WHITE, 1.0))
+    shading = shading_of(pixels)
+    color = shading.shades[shading.graded[0] - 1].flat
+    ground = ground_shade(torch.tensor([*color, 1.0]), shading)
+    circle = Shape.of("circle", (1, 1, 1), center=(-18 / SIDE, -18 / SIDE), radius=16 / SIDE)
+    made = repainted(Scene(SIDE, SIDE, (Layer((circle,)),), tuple(color.tolist())), shading, ground)
+    assert [layer.shapes[0].kind for layer in made.layers] == ["box", "circle"]
+    assert np.abs(shown(made) - pixels).mean() < 0.003
+    assert ground_shade(torch.tensor([1.0, 1.0, 1.0, 1.0]), shading) is None
+
+
+def test_no_layer_at_all():
+    shading = shading_of(painted((disc(50, 44, 30), ramp(HALF, RISE), 1.0)))
+    assert repainted(Scene(SIDE, SIDE, (), (1, 1, 1)), shading, None).layers == ()

@@ -1,0 +1,119 @@
+"""Gradients taken out of pictures, which are drawn in numpy; and what is no gradient."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from sdf2vec.fit.shading import Shading
+from sdf2vec.image import Picture
+from tests.fit.drawn import GREEN, SIDE, WHITE, box, disc, painted, ramp
+
+HALF = np.array([0.5, 0.3, 0.5])  # in the middle of the gradient
+RISE = np.array([0.4, 0.2, -0.4])  # of it from side to side
+
+
+def shading_of(pixels):
+    return Shading.of(Picture(pixels.astype(np.float32)))
+
+
+def flattened(pixels):
+    return shading_of(pixels).flattened.pixels
+
+
+def test_a_shape_with_a_gradient_gets_one_colour_to_its_edge():
+    mask = disc(50, 44, 30)
+    flat = flattened(painted((mask, ramp(HALF, RISE), 1.0)))
+    color = flat[44, 50]
+    assert color == pytest.approx(HALF + RISE * 2 / SIDE, abs=0.01)
+    assert (flat[30:58, 36:64] == color).all()
+    assert np.abs(flat - painted((mask, color, 1.0))).max() < 0.02
+
+
+def test_what_lies_on_a_gradient_stays():
+    shapes = (disc(30, 30, 10), WHITE, 1.0), (box(50, 20, 70, 80), GREEN, 1.0)
+    ground = (box(0, 0, SIDE, SIDE), ramp(HALF, RISE), 1.0)
+    flat = flattened(painted(ground, *shapes))
+    assert np.abs(flat - painted(*shapes, ground=flat[90, 90])).max() < 0.02
+
+
+def test_neither_do_thin_lines_vanish():
+    """Five pixels across there is no other region, but its colour is seen."""
+    line = (box(20, 40, 80, 42), WHITE, 1.0)
+    flat = flattened(painted((box(0, 0, SIDE, SIDE), ramp(HALF, RISE), 1.0), line))
+    assert np.abs(flat - painted(line, ground=flat[90, 90])).max() < 0.02
+
+
+def test_two_parts_of_one_gradient_are_one_region_and_another_is_another():
+    parts = box(5, 10, 40, 50) | box(56, 10, 90, 50)
+    shading = shading_of(
+        painted((parts, ramp(HALF, RISE), 1.0), (box(5, 60, 90, 90), ramp(HALF, -RISE), 1.0))
+    )
+    assert len(shading.graded) == 2
+    assert shading.labels[30, 20] == shading.labels[30, 70] != shading.labels[75, 50]
+
+
+def test_a_gradient_on_nothing():
+    pixels = painted((disc(50, 44, 30), ramp(HALF, RISE), 1.0))
+    alpha = painted((disc(50, 44, 30), np.zeros(3), 1.0))[..., :1]
+    flat = flattened(np.concatenate([pixels, 1.0 - alpha], axis=2))
+    assert np.ptp(flat[30:58, 36:64], axis=(0, 1)).max() == 0.0
+    assert flat[..., 3:] == pytest.approx(1.0 - alpha, abs=0.02)
+
+
+def test_a_large_picture_is_flattened_at_its_own_size():
+    mask = disc(50, 44, 30)
+    flat = flattened(painted((mask, ramp(HALF, RISE), 1.0), finer=1))
+    assert flat.shape == (4 * SIDE, 4 * SIDE, 3)
+    assert np.abs(flat - painted((mask, flat[176, 200], 1.0), finer=1)).max() < 0.02
+
+
+def soft():
+    x, y = np.meshgrid(*(np.arange(SIDE) + 0.5,) * 2)
+    share = 1 / (1 + np.exp((np.maximum(abs(x - 48), abs(y - 44)) - 20) / 4))
+    return WHITE + share[..., None] * (GREEN - WHITE)
+
+
+def soft_gradient():
+    x, y = np.meshgrid(*(np.arange(SIDE) + 0.5,) * 2)
+    share = 1 / (1 + np.exp(np.hypot(x - 48, y - 44) - 30))
+    return WHITE + share[..., None] * (HALF + (x / SIDE - 0.5)[..., None] * RISE - WHITE)
+
+
+def round_gradient():
+    x, y = np.meshgrid(*(np.arange(SIDE) + 0.5,) * 2)
+    share = np.clip(np.hypot(x - 48, y - 48) / 40, 0, 1)
+    return np.where(np.hypot(x - 48, y - 48)[..., None] < 36, GREEN + share[..., None] * RISE, WHITE)
+
+
+def fading():
+    """Green that is opaque on the left, and less to the right."""
+    alpha = np.broadcast_to(np.linspace(1.0, 0.4, SIDE)[None, :, None], (SIDE, SIDE, 1))
+    return np.concatenate([np.broadcast_to(GREEN, (SIDE, SIDE, 3)), alpha], axis=2)
+
+
+@pytest.mark.parametrize(
+    "pixels",
+    [
+        painted((disc(40, 40, 20), GREEN, 1.0)),
+        soft(),
+        soft_gradient(),
+        round_gradient(),
+        fading(),
+        np.random.default_rng(0).random((SIDE, SIDE, 3)),
+        np.zeros((1, 300, 3)),
+        np.zeros((2, 2, 3)),
+    ],
+    ids=[
+        "one colour",
+        "a soft edge",
+        "a gradient with one",
+        "a round one",
+        "fading",
+        "noise",
+        "one row",
+        "four pixels",
+    ],
+)
+def test_what_has_no_gradient(pixels):
+    assert shading_of(np.rint(pixels * 255) / 255) is None
