@@ -9,6 +9,7 @@ from __future__ import annotations
 import math
 from collections import Counter
 from collections.abc import Sequence
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from itertools import islice
 
@@ -144,8 +145,8 @@ def _few(picture: Picture, settings: Settings, callback: Callback) -> Fitted | N
     found = _searched(shading.flattened, fewer, callback, flat)
     if found is None:
         return None
-    scene = concise(repainted(found.scene, shading, ground), picture, settings)
-    return _told(scene, picture, settings)
+    drawing = Drawing(picture, settings, callback, flat)
+    return _told(drawing.finished(repainted(found.scene, shading, ground)), picture, settings)
 
 
 def _searched(picture: Picture, settings: Settings, callback: Callback, flat: bool) -> Fitted | None:
@@ -330,6 +331,13 @@ class Drawing:
         except Stopped:
             self.stopped = True
         self.error = error_of(self.scene, self.sizes.last)
+        return concise(self._made(), self.picture, self.settings)
+
+    def finished(self, scene: Scene) -> Scene:
+        """A scene after a last descent."""
+        self.scene = from_scene(scene)
+        with suppress(Stopped):
+            self.scene = finished(self.scene, self.sizes, self.search)
         return concise(self._made(), self.picture, self.settings)
 
     def _made(self) -> Scene:

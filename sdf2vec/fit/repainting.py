@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from functools import cache
@@ -9,7 +10,7 @@ from functools import cache
 import numpy as np
 import torch
 
-from ..arrays import Float64Array
+from ..arrays import Float64Array, IntArray
 from ..graph import components_of
 from ..layer import P
 from ..lower.numpy import Arrays, compile_numpy
@@ -44,13 +45,13 @@ def repainted(scene: Scene, shading: Shading, ground: Shade | None) -> Scene:
 
 def ground_shade(ground: torch.Tensor, shading: Shading) -> Shade | None:
     """The gradient that a ground [4] of the picture without any is in place of, if it is one."""
-    near = (shading.shades[number - 1] for number in shading.graded)
-    return next((shade for shade in near if _is_near(shade, ground[:3].tolist())), None)
+    near = (number for number in shading.graded if _is_near(shading, number, ground[:3].tolist()))
+    return next((shading.shades[number - 1] for number in near), None)
 
 
 def _seen(scene: SceneTensors, shading: Shading) -> Float64Array:
     """How much is seen of each layer in each region, [L, R], in draw order."""
-    labels = shading.nearest(LOOKED)
+    labels = _smaller(shading.nearest)
     height, width = labels.shape
     within = np.eye(len(shading.shades) + 1)[labels.ravel()][:, 1:]
     if not scene.groups:
@@ -64,17 +65,23 @@ def _seen(scene: SceneTensors, shading: Shading) -> Float64Array:
     return found
 
 
+def _smaller(labels: IntArray) -> IntArray:
+    """Labels [H, W] of a part of the pixels: of about so many as are looked at."""
+    step = max(1, round(math.sqrt(labels.size) / LOOKED))
+    return labels[step // 2 :: step, step // 2 :: step]
+
+
 def _shade_of(layer: Layer, seen: Float64Array, shading: Shading) -> Shade | None:
     """The gradient of the region [R] in which most is seen of a layer, if that is one and it has its colour."""
     number = int(seen.argmax()) + 1
     if number not in shading.graded or layer.opacity < OPAQUE:
         return None
-    shade = shading.shades[number - 1]
-    return shade if _is_near(shade, layer.shapes[0].color) else None
+    return shading.shades[number - 1] if _is_near(shading, number, layer.shapes[0].color) else None
 
 
-def _is_near(shade: Shade, color: Sequence[float]) -> bool:
-    return bool(np.abs(shade.color[:3] - color).max() < NEAR)
+def _is_near(shading: Shading, number: int, color: Sequence[float]) -> bool:
+    """Whether a colour is that of a region without its gradient."""
+    return bool(np.abs(shading.flats[number - 1, :3] - color).max() < NEAR)
 
 
 def _painted(layer: Layer, shade: Shade | None, size: tuple[float, float]) -> Layer:

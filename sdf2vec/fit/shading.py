@@ -6,7 +6,6 @@ it or on it stays: the picture is flat then. `repainting` puts the gradients int
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cached_property
@@ -33,6 +32,7 @@ REACH = 3  # pixels beyond a region that its edge may show in
 AROUND = 5  # pixels squared where an edge goes from one colour to the other
 NOISE = 3.0 / 255  # length of the difference of two colours that are one
 UNLIKE = 6.0 / 255  # from the region's colour, of an edge's other one
+CLEAR = 0.7  # share of the difference of two regions that is left without gradients, at least, if it can be
 SHARP = 0.7  # share of what lies beyond a region's edge that is another region, at least
 
 EVERYWHERE: Part = slice(None), slice(None)
@@ -49,12 +49,6 @@ class Shade(NamedTuple):
     def is_flat(self) -> bool:
         """Whether it is one colour."""
         return not self.slopes.any()
-
-    @property
-    def flat(self) -> Float32Array:
-        """The colour [C] that is in its place where there are no gradients, of 8 bits."""
-        found: Float32Array = (np.rint(self.color * WHITE) / WHITE).astype(np.float32)
-        return found
 
     def at(self, x: Float32Array, y: Float32Array) -> Float32Array:
         """The colour there [..., C]."""
@@ -91,23 +85,58 @@ class Shading:
         numbers = (number for number, shade in enumerate(self.shades, 1) if not shade.is_flat)
         return [number for number in numbers if _is_sharp(self.labels, number)]
 
-    def nearest(self, resolution: int) -> IntArray:
-        """The number of the region that each pixel of a smaller picture is in or next to, [h, w]."""
+    @cached_property
+    def nearest(self) -> IntArray:
+        """The number of the region that each pixel is in or next to, [H, W]."""
         _, (rows, columns) = ndimage.distance_transform_edt(self.labels == 0, return_indices=True)
-        scale = min(1.0, resolution / math.sqrt(self.labels.size))
-        height, width = (max(round(side * scale), 1) for side in self.labels.shape)
-        chosen = _resized(self.labels.shape, (height, width))
-        found: IntArray = self.labels[rows[chosen], columns[chosen]]
+        found: IntArray = self.labels[rows, columns]
         return found
 
     @cached_property
+    def flats(self) -> Float32Array:
+        """The colours [R, C] of the shades, of 8 bits; of a gradient one that it has, so that its region is as far from
+        those beside it as it was.
+        """
+        colors: Float32Array = np.rint(np.array([shade.color for shade in self.shades]) * WHITE) / WHITE
+        for number in self.graded:
+            beside = list(self._beside(number))
+            others, far = [index for index, _ in beside], np.array([far for _, far in beside])
+            choices = self._choices(number)
+            apart = np.linalg.norm(choices[:, None] - colors[others], axis=2)
+            left = np.minimum(apart / far, CLEAR).min(axis=1, initial=CLEAR)
+            colors[number - 1] = choices[left.argmax()]
+        return colors
+
+    def _choices(self, number: int) -> Float32Array:
+        """Colours [5, C] of 8 bits that a gradient has: in its middle, and towards and at both ends."""
+        x, y = np.broadcast_arrays(*_places(self.labels.shape))
+        shade, inside = self.shades[number - 1], self.labels == number
+        away = shade.at(x[inside], y[inside]) - shade.color
+        along = away @ np.linalg.svd(shade.slopes, full_matrices=False)[2][0]
+        ends = (away[along.argsort()[round(share * (len(along) - 1))]] for share in (0.25, 0.75, 0.0, 1.0))
+        choices = np.array([shade.color, *(shade.color + end for end in ends)])
+        found: Float32Array = np.rint(choices.clip(0.0, 1.0) * WHITE) / WHITE
+        return found
+
+    def _beside(self, number: int) -> Iterator[tuple[int, float]]:
+        """The places among all of the regions that begin where one ends, and how far the colours are apart there."""
+        x, y = np.broadcast_arrays(*_places(self.labels.shape))
+        inside = self.nearest == number
+        for other in np.unique(self.nearest[ndimage.binary_dilation(inside) & ~inside]).tolist():
+            edge = inside & ndimage.binary_dilation(self.nearest == other)
+            one, two = (self.shades[index - 1].at(x[edge], y[edge]) for index in (number, other))
+            far = float(np.linalg.norm(one - two, axis=1).mean())
+            if far > UNLIKE:
+                yield other - 1, far
+
+    @cached_property
     def flattened(self) -> Picture:
-        """The picture without its gradients: each of the colour that is in its middle."""
+        """The picture without its gradients: each is of a colour that it has."""
         before = self.picture.premultiplied
         flat = before.copy()
         for number in self.graded:
             part, near = self._around(number, before.shape[:2])
-            _flatten(self.shades[number - 1], before, flat, part, near)
+            _flatten(self.shades[number - 1], self.flats[number - 1], before, flat[part], part, near)
         flat = flat.clip(0.0, 1.0)
         return Picture(unpremultiply(flat) if self.picture.has_alpha else flat)
 
@@ -119,13 +148,15 @@ class Shading:
         return part, inside[_resized(small, sides, part)]
 
 
-def _flatten(shade: Shade, before: Float32Array, flat: Float32Array, part: Part, inside: BoolArray) -> None:
-    """Takes a gradient out of a part of a picture [H, W, C]."""
+def _flatten(
+    shade: Shade, color: Float32Array, before: Float32Array, flat: Float32Array, part: Part, inside: BoolArray
+) -> None:
+    """Puts a colour in the place of a gradient in a part of a picture [H, W, C], `flat`."""
     shown = shade.at(*_places(before.shape[:2], part))
     apart = np.linalg.norm(before[part] - shown, axis=2)
     near = ndimage.maximum_filter(inside & (apart <= UNLIKE), 2 * REACH + 1)
-    flat[part] += _share(apart, near)[..., None] * (shade.flat - shown)
-    flat[part][near & (apart <= NOISE)] = shade.flat
+    flat += _share(apart, near)[..., None] * (color - shown)
+    flat[near & (apart <= NOISE)] = color
 
 
 def _places(sides: Sides, part: Part = EVERYWHERE) -> tuple[Float32Array, Float32Array]:

@@ -107,7 +107,7 @@ def test_what_is_cut_out_stays_cut_out():
 def test_a_ground_with_a_gradient_is_a_box_under_all():
     pixels = painted((box(0, 0, SIDE, SIDE), ramp(HALF, RISE), 1.0), (disc(30, 30, 16), WHITE, 1.0))
     shading = shading_of(pixels)
-    color = shading.shades[shading.graded[0] - 1].flat
+    color = shading.flats[shading.graded[0] - 1]
     ground = ground_shade(torch.tensor([*color, 1.0]), shading)
     circle = Shape.of("circle", (1, 1, 1), center=(-18 / SIDE, -18 / SIDE), radius=16 / SIDE)
     made = repainted(Scene(SIDE, SIDE, (Layer((circle,)),), tuple(color.tolist())), shading, ground)

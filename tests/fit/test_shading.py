@@ -37,6 +37,14 @@ def test_what_lies_on_a_gradient_stays():
     assert np.abs(flat - painted(*shapes, ground=flat[90, 90])).max() < 0.02
 
 
+def test_what_has_the_colour_of_a_gradient_s_middle_at_its_end_is_still_seen():
+    spot = (disc(80, 40, 10), HALF, 1.0)
+    pixels = painted((box(0, 0, SIDE, SIDE), ramp(HALF, RISE), 1.0), spot)
+    flat = flattened(pixels)
+    there, left = (np.linalg.norm(image[40, 80] - image[40, 66]) for image in (pixels, flat))
+    assert left > 0.65 * there
+
+
 def test_neither_do_thin_lines_vanish():
     """Five pixels across there is no other region, but its colour is seen."""
     line = (box(20, 40, 80, 42), WHITE, 1.0)
