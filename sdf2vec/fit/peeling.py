@@ -30,6 +30,10 @@ from .transparency import Overlay, bared, overlays
 from .windows import Part, Sides, larger, means, smaller, widened
 
 MOST = 256  # layers that are taken off a picture
+FAILED, FORGIVEN = (
+    64,
+    0.5,
+)  # regions that are no shapes, before the rest is left; and so many more for each that is one
 KNOWN = 0.5  # share of it that is flat regions, for any to be
 POINTS = 4000  # at most, at which an outline is looked for
 MARGIN = 0.2, 4  # around a region: share of its longer side, and pixels
@@ -115,7 +119,7 @@ def peeled(scene: SceneTensors, views: Sequence[View], search: Search) -> SceneT
         return scene
     outlines = Outlines(scene, [Surroundings.of(scene, 0, view) for view in views], search)
     found: list[Group] = []
-    while len(found) < MOST and (top := outlines.topmost(regions)):
+    while len(found) < MOST and not outlines.are_hopeless and (top := outlines.topmost(regions)):
         found += [each.layer for each in top if not each.soft]
         if top[0].is_opaque:
             regions = regions.hidden(np.any([each.overlay.inside for each in top], axis=0))
@@ -227,10 +231,20 @@ class Outlines:
                 found += self._good(opaque(regions, self.scene.background.numpy(), whole), regions)
         return _apart(sorted(found, key=lambda each: each.rank), regions)
 
+    @property
+    def are_hopeless(self) -> bool:
+        """Whether so many regions are no shapes that the picture is hardly made of shapes: of a photograph reduced to
+        few colours, or of the blocks that JPEG makes of a gradient.
+        """
+        good = sum(each is not None and each.is_good for each in self.done.values())
+        return len(self.done) - good > FAILED + FORGIVEN * good
+
     def _good(self, tried: Iterable[Overlay], regions: Regions) -> list[Outlined]:
         """Those of some overlays that a shape has the outline of."""
         found = []
         for overlay in tried:
+            if self.are_hopeless:
+                break
             area, fine = self._areas(overlay, regions)
             best = self._of(area, fine)
             if best is not None and best.is_good and _holds(best.layer, area, fine, regions):

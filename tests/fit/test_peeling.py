@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 import torch
 
-from sdf2vec.fit import sparse
+from sdf2vec.fit import peeling, sparse
 from sdf2vec.fit.auto import Drawing
 from sdf2vec.fit.initialization import Layers
 from sdf2vec.fit.joining import Search
@@ -187,6 +187,14 @@ def test_ninety_dots_are_ninety_circles():
     assert sorted(away.argmin(axis=1)) == list(range(90))
     assert away.min(axis=1).max() < 0.3 / SIDE
     assert found[:, 2] == pytest.approx(3.2 / SIDE, abs=0.3 / SIDE)
+
+
+def test_where_hardly_any_region_is_a_shape_the_rest_is_left(monkeypatch):
+    """Of a photograph in few colours each would be looked at in vain, for minutes."""
+    tried = []
+    monkeypatch.setattr(peeling, "_outlined", lambda *arguments: tried.append(arguments))
+    assert not apart(painted((dots(10, 9, 3.2)[1], BLUE, 1.0)))
+    assert len(tried) == peeling.FAILED + 1
 
 
 def test_a_field_lies_under_what_little_is_on_it():
