@@ -76,6 +76,9 @@ FAR = 10**-2.5  # 25 dB, of what is not yet the picture
 DOMINANT = 0.15  # share of the most common colour, of a picture that has a ground
 # times the shapes found that are fitted where these alone are not the drawing; then, as many as allowed
 MORE = 2, 4, 12
+CLEARLY = (
+    0.97  # of the description before, at most, where more shapes make it shorter: they take more in a file
+)
 
 
 @dataclass(frozen=True)
@@ -189,8 +192,8 @@ def _one_less(settings: Settings) -> Settings:
 
 
 def _enough(picture: Picture, settings: Settings, found: Scene, view: View, callback: Callback) -> Scene:
-    """What goes on from what was found with ever more shapes, as long as that makes the description shorter; what is
-    far from the picture tries them all.
+    """What goes on from what was found with ever more shapes, as long as that makes the description clearly shorter;
+    what is far from the picture tries them all.
     """
     best, shortest = found, description_length(from_scene(found), view)
     counts = (min(max(times * max(found.shape_count, 1), FEW), settings.most) for times in (*MORE, math.inf))
@@ -200,7 +203,7 @@ def _enough(picture: Picture, settings: Settings, found: Scene, view: View, call
         more = structs.replace(settings, start=best if best.layers else None, shapes=int(count))
         tried = fit_concisely(picture, more, callback)
         length = description_length(from_scene(tried), view)
-        if length < shortest:
+        if length < CLEARLY * shortest:
             best, shortest = tried, length
         elif error_of(from_scene(best), view) <= FAR:
             break
