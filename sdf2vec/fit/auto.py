@@ -76,9 +76,7 @@ FAR = 10**-2.5  # 25 dB, of what is not yet the picture
 DOMINANT = 0.15  # share of the most common colour, of a picture that has a ground
 # times the shapes found that are fitted where these alone are not the drawing; then, as many as allowed
 MORE = 2, 4, 12
-CLEARLY = (
-    0.97  # of the description before, at most, where more shapes make it shorter: they take more in a file
-)
+CLEARLY = 0.97  # of the description before, at most, that more shapes come to: they take more in a file
 
 
 @dataclass(frozen=True)
