@@ -24,13 +24,15 @@ WHITE = 255  # levels
 LOOKED = 320  # pixels squared, at which regions are looked for
 BENT, STEEP = 2.2 / 255, 16.0 / 255  # second differences of what is even, at most; first ones
 PLANE, NEARLY = 2.2 / 255, 0.98  # how far a region is from a plane at most; share of it that is as near
+BENDS = 0.06  # how far it may be, too, by what its colour changes: as where there is a third one in between
 SMALLEST = 3  # pixels of a side, for anything to be even
 LEAST, LEAST_SHADED = 9, 60  # pixels of a region; of one that is no single colour
 CHANGES = 6.0 / 255  # of a colour across a region, at least, of a gradient
 ALIKE = 3.0 / 255  # how far two regions of one plane are from it, at most
 REACH = 3  # pixels beyond a region that its edge may show in
 AROUND = 5  # pixels squared where an edge goes from one colour to the other
-NOISE = 3.0 / 255  # length of the difference of two colours that are one
+# length of the difference of two colours that are one, in a region at its edge, and where it may be no plane
+NOISE, BENT_AWAY = 3.0 / 255, 16.0 / 255
 UNLIKE = 6.0 / 255  # from the region's colour, of an edge's other one
 CLEAR = 0.7  # share of the difference of two regions that is left without gradients, at least, if it can be
 SHARP = 0.7  # share of what lies beyond a region's edge that is another region, at least
@@ -135,28 +137,22 @@ class Shading:
         before = self.picture.premultiplied
         flat = before.copy()
         for number in self.graded:
-            part, near = self._around(number, before.shape[:2])
-            _flatten(self.shades[number - 1], self.flats[number - 1], before, flat[part], part, near)
+            self._flatten(number, before, flat)
         flat = flat.clip(0.0, 1.0)
         return Picture(unpremultiply(flat) if self.picture.has_alpha else flat)
 
-    def _around(self, number: int, sides: Sides) -> tuple[Part, BoolArray]:
-        """A part of the picture, at its own size, that holds a region and its edge; and where that may be in it."""
-        small = self.labels.shape
-        inside = ndimage.binary_dilation(self.labels == number, iterations=REACH)
-        part = larger(widened(extent(inside), 1, small), sides, small)
-        return part, inside[_resized(small, sides, part)]
-
-
-def _flatten(
-    shade: Shade, color: Float32Array, before: Float32Array, flat: Float32Array, part: Part, inside: BoolArray
-) -> None:
-    """Puts a colour in the place of a gradient in a part of a picture [H, W, C], `flat`."""
-    shown = shade.at(*_places(before.shape[:2], part))
-    apart = np.linalg.norm(before[part] - shown, axis=2)
-    near = ndimage.maximum_filter(inside & (apart <= UNLIKE), 2 * REACH + 1)
-    flat += _share(apart, near)[..., None] * (color - shown)
-    flat[near & (apart <= NOISE)] = color
+    def _flatten(self, number: int, before: Float32Array, flat: Float32Array) -> None:
+        """Puts a colour in the place of a gradient of a picture [H, W, C], `flat`."""
+        sides, small = before.shape[:2], self.labels.shape
+        own = self.labels == number
+        around = ndimage.binary_dilation(own, iterations=REACH)
+        part = larger(widened(extent(around), 1, small), sides, small)
+        own, around = (mask[_resized(small, sides, part)] for mask in (own, around))
+        shown, color = self.shades[number - 1].at(*_places(sides, part)), self.flats[number - 1]
+        apart = np.linalg.norm(before[part] - shown, axis=2)
+        near = ndimage.maximum_filter(around & (apart <= UNLIKE), 2 * REACH + 1)
+        flat[part] += _share(apart, near)[..., None] * (color - shown)
+        flat[part][near & (apart <= np.where(own, BENT_AWAY, NOISE))] = color
 
 
 def _places(sides: Sides, part: Part = EVERYWHERE) -> tuple[Float32Array, Float32Array]:
@@ -258,9 +254,10 @@ def _shade(x: Float32Array, y: Float32Array, colors: Float32Array) -> Shade | No
     middle, mean = places.mean(axis=0), colors.mean(axis=0)
     slopes: Float32Array = np.linalg.lstsq(places - middle, colors - mean)[0]
     change = (places - middle) @ slopes
-    if np.mean(np.abs(mean + change - colors).max(axis=1) <= PLANE) < NEARLY:
+    changes = float(np.ptp(change, axis=0).max())
+    if np.mean(np.abs(mean + change - colors).max(axis=1) <= max(PLANE, BENDS * changes)) < NEARLY:
         return None
-    if np.ptp(change, axis=0).max() < CHANGES:
+    if changes < CHANGES:
         return Shade(middle, np.median(colors, axis=0), np.zeros_like(slopes))
     fades = colors.shape[1] == 4 and np.ptp(colors[:, 3]) > CHANGES
     return None if fades or len(colors) < LEAST_SHADED else Shade(middle, mean, slopes)
