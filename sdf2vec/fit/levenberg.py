@@ -102,11 +102,12 @@ def _step(
     """How far the free numbers are too large by the damped normal equations, [G, F].
 
     What a longest step of a number does is damped as if it were at least a share of what one of any other does: else
-    a number that does nothing here would be moved far, whatever the damping.
+    a number that does nothing here would be moved far, whatever the damping. No way at all where two numbers do the
+    same to within rounding: then the next step is damped more.
     """
     scale = normal.diagonal(dim1=1, dim2=2)
     effect = scale * longest.square()
     scale = torch.maximum(effect, FAINT * effect.amax(1, keepdim=True)) / longest.square()
     damped = normal + torch.diag_embed(scale * damping[:, None] + TINY)
-    step: torch.Tensor = torch.linalg.solve(damped, right)
-    return step
+    step, failed = torch.linalg.solve_ex(damped, right)
+    return torch.where(failed[:, None] == 0, step, 0.0)

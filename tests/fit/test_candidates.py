@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 import torch
 
-from sdf2vec.fit import surroundings
+from sdf2vec.fit import levenberg, surroundings
 from sdf2vec.fit.laying import Laid
 from sdf2vec.fit.levenberg import Dense, Numbers, descend
 from sdf2vec.fit.regions import ellipses, strokes
@@ -36,6 +36,17 @@ def test_a_number_that_is_not_free_stays():
     free = Numbers(torch.tensor([1]), torch.tensor([0.1]), lambda rows: None)
     rows, _ = descend(torch.tensor([[0.25, 0.0]]), problem, free, 3, lambda error: None)
     assert rows[0].tolist() == pytest.approx([0.25, 0.3])  # a tenth in each step
+
+
+def test_two_numbers_that_do_the_same_are_damped_until_they_can_be_told_apart(monkeypatch):
+    """Undamped there is no solution."""
+    monkeypatch.setattr(levenberg, "FIRST_DAMPING", 0.0)
+    slopes = 1000.0 * torch.linspace(1.0, 2.0, 5)
+    problem = Dense(lambda rows: ((rows[:, 0] + rows[:, 1] - 1.0) * slopes)[:, None], len(slopes))
+    free = Numbers(torch.arange(2), torch.ones(2), lambda rows: None)
+    rows, errors = descend(torch.zeros(1, 2), problem, free, 12, lambda error: None)
+    assert float(errors) < 1e-3
+    assert float(rows.sum()) == pytest.approx(1.0, abs=1e-4)
 
 
 def test_a_bar_gives_an_ellipse_along_it():

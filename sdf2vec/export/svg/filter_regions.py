@@ -16,6 +16,7 @@ REACH = 3.0  # standard deviations that a blur reaches
 USUAL_MARGIN = 0.1  # of a box, that a filter's region has by itself
 LARGER = 3.0  # times as large a region is as good
 SMALLEST = 0.1  # user units: no box is taken for smaller
+THIN = 1.0  # user units: a side that may be written as none, and nothing is blurred in shares of that
 MOST = 128  # different margins of figures of one blur; of more, those are told apart that are of other steps
 MARGINS = (0.1, 0.2, 0.3, 0.45, 0.6, 0.8, 1.1, 1.5, 2, 3, 4.5, 7, 10, 20, 50, 100, 200, 500, 1000)
 
@@ -93,7 +94,7 @@ def shared_regions(drawing: Drawing, worth: float) -> dict[Figure, Region]:
 class _Shared(NamedTuple):
     """Figures of one filter: the margins of their boxes [2] in their sides, the boxes' area, the number of figures.
 
-    That is infinite where the canvas can't be their region.
+    The area is infinite where a box is too thin for a region in shares of it, the number where the canvas can't be it.
     """
 
     figures: tuple[Figure, ...]
@@ -124,7 +125,8 @@ def _alike(figures: Sequence[Figure]) -> list[_Shared]:
     found: dict[tuple[float, ...], _Shared] = {}
     for figure, box, own in zip(figures, boxes, margins, strict=True):
         number = 1.0 if isinstance(figure.geometry, PolygonOutline | Path) else math.inf
-        one, key = _Shared((figure,), own, float(box.prod()), number), (number, *own.tolist())
+        area = float(box.prod()) if number == math.inf or box.min() >= THIN else math.inf
+        one, key = _Shared((figure,), own, area, number), (number, *own.tolist())
         found[key] = found[key] | one if key in found else one
     return list(found.values())
 

@@ -37,6 +37,14 @@ def test_a_sliver_with_a_wide_blur_takes_the_canvas() -> None:
     assert regions(*wide, worth=10.0) == [canvas, canvas]
 
 
+@pytest.mark.parametrize("height", [0.0, 0.4])
+def test_what_has_no_height_but_a_stroke_has_a_region_in_user_units(height: float) -> None:
+    """Shares of a box without a height are none: renderers would not draw it."""
+    bar = PolygonOutline(((50.0, 50.0), (90.0, 50.0), (90.0, 50.0 + height)), 10.0)
+    (region,) = regions(Figure(bar, BLACK, blur=2.0))
+    assert region == Region(-6.0, -6.0, 212.0, 112.0, in_user_units=True)
+
+
 def test_a_turned_ellipse_has_units_of_its_own_and_keeps_its_box() -> None:
     ellipse = EllipseOutline((50.0, 50.0), (250.0, 0.5), 0.5)
     sliver = Figure(polygon(500.0, 1.0), BLACK, blur=30.0)

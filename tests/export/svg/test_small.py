@@ -98,6 +98,17 @@ def test_narrow_edges_are_blurred(engine, deviation, require_engine):
     assert_as_rendered(engine, text, scene, 41, 0.5)
 
 
+@pytest.mark.parametrize("engine", ["resvg", "chromium", "librsvg"])
+@pytest.mark.parametrize("half", [(0.4, 0.06), (0.06, 0.35)])
+def test_a_bar_with_round_ends_and_a_soft_edge_is_drawn(engine, half, require_engine):
+    """Its outline is a line, upright or level, and a stroke."""
+    require_engine(engine)
+    bar = Shape.of("box", (1, 0.9, 0.2), center=(-0.2, 0), half_size=half, angle=0, corner_radius=min(half))
+    scene = Scene(150, 100, (Layer((bar,), 0.05),), (0.1, 0.2, 0.4))
+    text = str(small_svg(rounded(scene, GRAINS[0]), Options(), GRAINS[0]).data)
+    assert_as_rendered(engine, text, scene, 34, 1.0)
+
+
 @pytest.mark.parametrize("units", [512, 1024])
 def test_how_far_it_is_off_is_told(units, require_engine):
     """Sharp edges, of which some are not on the grid: boxes, contours, ellipses. Never told as less than half of it."""
