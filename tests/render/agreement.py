@@ -39,9 +39,8 @@ def is_well_conditioned(scene, size):
     Where two outlines that are joined sharply are about equally far from a pixel, rounding decides which of them
     counts there, and turns a derivative by more than any renderer may.
     """
-    return (
-        _farther(*(_reference(scene, dtype, size) for dtype in (torch.float64, torch.float32)), SURELY) == []
-    )
+    exact, single = (_reference(scene, dtype, size) for dtype in (torch.float64, torch.float32))
+    return _farther(exact, single, SURELY) == []
 
 
 def _reference(scene, dtype, size, channels=4):
