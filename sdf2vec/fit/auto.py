@@ -33,8 +33,8 @@ from .loop import Callback, Progress, Stopped
 from .matching_pursuit import Painted, find_discs
 from .offers import common_color
 from .one_more import gain_of_one_more
-from .ramps import grounded
-from .repainting import KIND, ground_shade, repainted
+from .ramps import KIND, grounded
+from .repainting import ground_shade, repainted
 from .settings import AUTO, Settings, preset_of
 from .shading import Shade, Shading
 from .simplify import sharing, simplified

@@ -30,10 +30,8 @@ from .transparency import Overlay, bared, overlays
 from .windows import Part, Sides, larger, means, smaller, widened
 
 MOST = 256  # layers that are taken off a picture
-FAILED, FORGIVEN = (
-    64,
-    0.5,
-)  # regions that are no shapes, before the rest is left; and so many more for each that is one
+# regions that are no shapes, before the rest is left; and so many more for each that is one
+FAILED, FORGIVEN = 64, 0.5
 KNOWN = 0.5  # share of it that is flat regions, for any to be
 POINTS = 4000  # at most, at which an outline is looked for
 MARGIN = 0.2, 4  # around a region: share of its longer side, and pixels

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import combinations, product
@@ -44,12 +44,9 @@ class Regions:
         parts = connected(
             _calm(pixels), lambda one, other: np.abs(pixels[one] - pixels[other]).max(axis=2) <= STEADY
         )
-        sizes = np.bincount(parts.ravel())
-        sizes[0] = 0
         labels, sure, colors = np.zeros_like(parts), np.zeros(parts.shape, bool), []
-        for number in np.argsort(-sizes, kind="stable")[:MOST]:
-            inside = parts == number
-            if sizes[number] >= LEAST and (np.ptp(pixels[inside], axis=0) <= EVEN).all():
+        for inside in largest(parts, LEAST):
+            if (np.ptp(pixels[inside], axis=0) <= EVEN).all():
                 colors.append(np.median(pixels[inside], axis=0))
                 labels[inside] = len(colors)
         known = np.array(colors).reshape(-1, pixels.shape[2])
@@ -170,6 +167,15 @@ def connected(chosen: BoolArray, alike: Callable[[Part, Part], BoolArray]) -> In
     graph = coo_matrix((np.ones(ends.shape[1], bool), ends), shape=(chosen.size, chosen.size))
     _, found = connected_components(graph, directed=False)
     return np.where(chosen, found.reshape(chosen.shape).astype(np.int64) + 1, 0)
+
+
+def largest(parts: IntArray, least: int) -> Iterator[BoolArray]:
+    """Masks [H, W] of numbered parts, the largest first: of at least so many pixels each, no more than `MOST`."""
+    sizes = np.bincount(parts.ravel())
+    sizes[0] = 0
+    for number in np.argsort(-sizes, kind="stable")[:MOST]:
+        if sizes[number] >= least:
+            yield parts == number
 
 
 def _shared_out(pixels: Float64Array, cores: IntArray, colors: Float64Array) -> tuple[IntArray, BoolArray]:

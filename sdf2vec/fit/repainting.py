@@ -14,17 +14,17 @@ from ..arrays import Float64Array, IntArray
 from ..graph import components_of
 from ..layer import P
 from ..lower.numpy import Arrays, compile_numpy
+from ..render.occlusion import showing
 from ..render.reference import canvas, layers_at
 from ..render.tensors import SceneTensors, from_scene
 from ..scene import Layer, Scene, Shape
 from ..shapes import KINDS
+from .ramps import KIND, MARGIN, PAINT
 from .shading import Shade, Shading
 
-PAINT, KIND = "linear", "box"
 LOOKED = 128  # pixels squared, at which is told which regions are seen of a layer
 NEAR = 0.1  # how far a channel of its colour may be from that of the region
 OPAQUE = 0.9  # at least
-MARGIN = 0.1  # scene units by which a box under all is larger than the canvas
 UNSEEN = 3.0 / 255  # change of a colour from a shape's middle to its edge that is not worth a gradient
 LEAST = 0.5  # share of that way on which it changes, at least: there may be no such colours farther on
 TINY = 1e-6
@@ -37,7 +37,7 @@ def repainted(scene: Scene, shading: Shading, ground: Shade | None) -> Scene:
     tensors = from_scene(scene)
     layers = [
         _painted(layer, _shade_of(layer, seen, shading), tensors.size)
-        for layer, seen in zip(scene.layers, _seen(tensors, shading), strict=True)
+        for layer, seen in zip(scene.layers, _seen(scene, tensors, shading), strict=True)
     ]
     below = [] if ground is None else [Layer((_graded(_over_all(tensors.size), ground, tensors.size),))]
     return replace(scene, layers=(*below, *layers))
@@ -49,19 +49,16 @@ def ground_shade(ground: torch.Tensor, shading: Shading) -> Shade | None:
     return next((shading.shades[number - 1] for number in near), None)
 
 
-def _seen(scene: SceneTensors, shading: Shading) -> Float64Array:
+def _seen(scene: Scene, tensors: SceneTensors, shading: Shading) -> Float64Array:
     """How much is seen of each layer in each region, [L, R], in draw order."""
     labels = _smaller(shading.nearest)
     height, width = labels.shape
     within = np.eye(len(shading.shades) + 1)[labels.ravel()][:, 1:]
-    if not scene.groups:
+    if not scene.layers:
         return np.zeros((0, within.shape[1]))
-    covers, _ = layers_at(scene, *canvas(scene, width, height))
-    order = torch.cat([group.order for group in scene.groups]).argsort()
-    opacities = torch.cat([group.opacity for group in scene.groups])[order]
-    own = (covers * opacities).double().numpy()
-    above = np.cumprod(np.concatenate([np.ones_like(own[:1]), 1.0 - own[:0:-1]]), axis=0)[::-1]
-    found: Float64Array = (own * above) @ within
+    covers, _ = layers_at(tensors, *canvas(tensors, width, height))
+    alphas = covers.numpy() * np.array([[layer.opacity] for layer in scene.layers], np.float32)
+    found: Float64Array = (alphas * showing(alphas)) @ within
     return found
 
 

@@ -1,7 +1,7 @@
 """Gradients of a picture, taken out of it: shapes that run from one colour to another are searched in one colour.
 
-Where a region of the picture is a plane in its colours, all of it gets the colour of its middle, and what lies beside
-it or on it stays: the picture is flat then. `repainting` puts the gradients into the shapes that were found.
+Where a region of the picture is a plane in its colours, all of it gets one of these, and what lies beside it or on
+it stays: the picture is flat then. `repainting` puts the gradients into the shapes that were found.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ from scipy import ndimage
 
 from ..arrays import BoolArray, Float32Array, IntArray
 from ..image import Picture, unpremultiply
-from .region_graph import MOST, connected
+from .region_graph import connected, largest
 from .views import scaled
 from .windows import Part, Sides, extent, larger, widened
 
@@ -223,11 +223,7 @@ def _planes(pixels: Float32Array) -> Iterator[BoolArray]:
     even = _even(pixels)
     slopes = np.concatenate([np.gradient(pixels, axis=axis) for axis in (0, 1)], axis=2)
     parts = connected(even, lambda one, other: np.abs(slopes[one] - slopes[other]).max(axis=2) <= BENT)
-    sizes = np.bincount(parts.ravel())
-    sizes[0] = 0
-    for number in np.argsort(-sizes, kind="stable")[:MOST]:
-        if sizes[number] >= LEAST:
-            yield parts == number
+    yield from largest(parts, LEAST)
 
 
 def _even(pixels: Float32Array) -> BoolArray:

@@ -1,10 +1,13 @@
-"""Fits of few steps."""
+"""Fits of few steps; pictures that resvg draws."""
 
 from dataclasses import replace
 
+import numpy as np
 import pytest
 
+from sdf2vec.engines import resvg
 from sdf2vec.fit.presets import PRESETS, Phase, Preset, Relocation
+from sdf2vec.image import Picture
 
 
 @pytest.fixture
@@ -15,3 +18,17 @@ def short_fits(monkeypatch):
     monkeypatch.setitem(PRESETS, "fast", fast)
     phases = tuple(replace(phase, steps=12) for phase in PRESETS["thesis"].phases)
     monkeypatch.setitem(PRESETS, "thesis", replace(PRESETS["thesis"], phases=phases))
+
+
+@pytest.fixture
+def drawn(require_engine):
+    """The picture that resvg draws of SVG elements."""
+    require_engine("resvg")
+
+    def draw(shapes, width=96, height=96):
+        text = f'<svg xmlns="http://www.w3.org/2000/svg" width="{width}" height="{height}">{shapes}</svg>'
+        pixels = resvg.render(text, width, height)
+        opaque = bool((pixels[..., 3] == 1.0).all())
+        return Picture(np.ascontiguousarray(pixels[..., : 3 if opaque else 4], dtype=np.float32))
+
+    return draw

@@ -6,6 +6,8 @@ WHITE, BLUE, RED, GREEN = (
     np.array(c) for c in ((1, 1, 1), (0.1, 0.2, 0.8), (0.9, 0.1, 0.1), (0.2, 0.7, 0.3))
 )
 SIDE, FINER = 96, 4
+# of a gradient: its colour in the middle, and how much it rises from side to side
+HALF, RISE = np.array([0.5, 0.3, 0.5]), np.array([0.4, 0.2, -0.4])
 
 
 def points():
@@ -33,7 +35,7 @@ def painted(*layers, ground=WHITE, finer=FINER):
     return np.rint(means * 255) / 255
 
 
-def ramp(middle, rise):
-    """Colours [n, n, 3] of all samples that rise from the left to the right; one in the middle."""
+def ramp(rise=RISE):
+    """Colours [n, n, 3] of all samples that rise from the left to the right."""
     x, _ = points()
-    return middle + (x / SIDE - 0.5)[..., None] * rise
+    return HALF + (x / SIDE - 0.5)[..., None] * rise

@@ -12,7 +12,6 @@ from skimage import data
 
 from sdf2vec import Scene, Sdf2vecError, fit, fitted
 from sdf2vec.bench.known_scenes import known_scene
-from sdf2vec.engines import resvg
 from sdf2vec.fit import auto
 from sdf2vec.fit.auto import ground_of, is_flat
 from sdf2vec.fit.initialization import Layers
@@ -32,20 +31,6 @@ DISC = '<circle cx="44" cy="50" r="24" fill="#d02040"/>'
 UNDER = '<circle cx="40" cy="40" r="22" fill="#2040d0"/>'
 OVER = '<rect x="38" y="44" width="40" height="30" fill="#10a050"/>'
 TRIANGLE = '<polygon points="70,8 90,34 60,30" fill="#e0a010"/>'
-
-
-@pytest.fixture
-def drawn(require_engine):
-    """The picture that resvg draws of SVG elements."""
-    require_engine("resvg")
-
-    def draw(shapes, width=96, height=96):
-        text = f'<svg xmlns="http://www.w3.org/2000/svg" width="{width}" height="{height}">{shapes}</svg>'
-        pixels = resvg.render(text, width, height)
-        opaque = bool((pixels[..., 3] == 1.0).all())
-        return Picture(np.ascontiguousarray(pixels[..., : 3 if opaque else 4], dtype=np.float32))
-
-    return draw
 
 
 def noise():

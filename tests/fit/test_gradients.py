@@ -2,12 +2,9 @@
 
 from __future__ import annotations
 
-import numpy as np
 import pytest
 
 from sdf2vec import fit, fitted
-from sdf2vec.engines import resvg
-from sdf2vec.image import Picture
 from sdf2vec.quality import quality
 
 SIDE = 128
@@ -24,18 +21,9 @@ DISCS = '<circle cx="40" cy="46" r="20" fill="#fff"/><circle cx="88" cy="80" r="
 
 
 @pytest.fixture
-def drawn(require_engine):
-    require_engine("resvg")
-
-    def draw(shapes):
-        text = (
-            f'<svg xmlns="http://www.w3.org/2000/svg" width="{SIDE}" height="{SIDE}">{GRADIENT}{shapes}</svg>'
-        )
-        pixels = resvg.render(text, SIDE, SIDE)
-        opaque = bool((pixels[..., 3] == 1.0).all())
-        return Picture(np.ascontiguousarray(pixels[..., : 3 if opaque else 4], dtype=np.float32))
-
-    return draw
+def shaded(drawn):
+    """The picture of elements that may be filled with the gradient."""
+    return lambda shapes: drawn(GRADIENT + shapes, SIDE, SIDE)
 
 
 def paints_of(scene):
@@ -43,8 +31,8 @@ def paints_of(scene):
 
 
 @pytest.mark.parametrize("ground", [WHITE, ""], ids=["on white", "on nothing"])
-def test_a_badge_is_a_box_with_a_gradient_and_a_disc(ground, drawn):
-    picture = drawn(ground + BADGE)
+def test_a_badge_is_a_box_with_a_gradient_and_a_disc(ground, shaded):
+    picture = shaded(ground + BADGE)
     found = fitted(picture)
     assert sorted(shape.kind for layer in found.scene.layers for shape in layer.shapes) == ["box", "circle"]
     assert paints_of(found.scene)[0] == "linear"
@@ -53,22 +41,22 @@ def test_a_badge_is_a_box_with_a_gradient_and_a_disc(ground, drawn):
 
 
 @pytest.mark.parametrize("shapes", ["auto", 3, 6])
-def test_the_gradient_of_a_ground_counts_as_a_shape(shapes, drawn):
-    picture = drawn(GROUND + DISCS)
+def test_the_gradient_of_a_ground_counts_as_a_shape(shapes, shaded):
+    picture = shaded(GROUND + DISCS)
     scene = fit(picture, shapes)
     assert scene.shape_count == (3 if shapes == "auto" else shapes)
     assert paints_of(scene)[0] == "linear"
     assert quality(scene, picture).psnr >= 38
 
 
-def test_what_a_user_does_not_allow_has_no_part_in_it(drawn):
-    scene = fit(drawn(GROUND + DISCS), kind="circle", max_shapes=8)
+def test_what_a_user_does_not_allow_has_no_part_in_it(shaded):
+    scene = fit(shaded(GROUND + DISCS), kind="circle", max_shapes=8)
     assert {shape.kind for layer in scene.layers for shape in layer.shapes} <= {"circle"}
     assert scene.shape_count <= 8
 
 
-def test_a_target_is_measured_on_the_picture_itself(drawn):
-    picture = drawn(GROUND + DISCS)
+def test_a_target_is_measured_on_the_picture_itself(shaded):
+    picture = shaded(GROUND + DISCS)
     found = fitted(picture, target_psnr=36)
     assert found.met
     assert quality(found.scene, picture).psnr >= 36

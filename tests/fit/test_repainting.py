@@ -9,19 +9,13 @@ import pytest
 import torch
 
 from sdf2vec.fit.repainting import ground_shade, repainted
-from sdf2vec.fit.shading import Shading
-from sdf2vec.image import Picture
 from sdf2vec.render import reference
 from sdf2vec.scene import Joint, Layer, Scene, Shape
-from tests.fit.drawn import RED, SIDE, WHITE, box, disc, painted, points, ramp
+from tests.fit.drawn import HALF, RED, RISE, SIDE, WHITE, box, disc, painted, points, ramp
+from tests.fit.test_shading import shading_of
 
-HALF, RISE = np.array([0.5, 0.3, 0.5]), np.array([0.4, 0.2, -0.4])
 WHERE: dict[str, Any] = {"center": ((50 - 48) / SIDE, (44 - 48) / SIDE)}  # that disc in scene units
 BOX: dict[str, Any] = {"half_size": (30 / SIDE, 20 / SIDE), "corner_radius": 0.0, "angle": 0.4}
-
-
-def shading_of(pixels):
-    return Shading.of(Picture(pixels.astype(np.float32)))
 
 
 def shown(scene):
@@ -70,7 +64,7 @@ def test_a_shape_gets_the_gradient_of_its_region(mask, kind, numbers):
     ids=["another colour", "translucent", "elsewhere"],
 )
 def test_other_layers_keep_their_colour(color, opacity, center):
-    shading = shading_of(painted((disc(50, 44, 30), ramp(HALF, RISE), 1.0)))
+    shading = shading_of(painted((disc(50, 44, 30), ramp(), 1.0)))
     own = middle_color(shading) if color is None else tuple(color)
     layer = Layer((Shape.of("circle", own, center=center, radius=0.08),), opacity=opacity)
     scene = Scene(SIDE, SIDE, (layer,), (1, 1, 1))
@@ -78,7 +72,7 @@ def test_other_layers_keep_their_colour(color, opacity, center):
 
 
 def test_a_small_shape_gets_the_colour_that_is_there():
-    shading = shading_of(painted((disc(50, 44, 30), ramp(HALF, RISE), 1.0)))
+    shading = shading_of(painted((disc(50, 44, 30), ramp(), 1.0)))
     dot = Shape.of("circle", middle_color(shading), center=(20 / SIDE, 0.0), radius=2 / SIDE)
     (layer,) = repainted(Scene(SIDE, SIDE, (Layer((dot,)),), (1, 1, 1)), shading, None).layers
     assert layer.shapes[0].paint == "flat"
@@ -87,7 +81,7 @@ def test_a_small_shape_gets_the_colour_that_is_there():
 
 def test_what_is_hidden_has_no_part_in_it():
     """A circle most of which lies under a white box, where it is drawn alone at its left."""
-    shading = shading_of(painted((disc(50, 44, 30), ramp(HALF, RISE), 1.0), (box(30, 0, 96, 96), WHITE, 1.0)))
+    shading = shading_of(painted((disc(50, 44, 30), ramp(), 1.0), (box(30, 0, 96, 96), WHITE, 1.0)))
     circle = Shape.of("circle", middle_color(shading, 26), **WHERE, radius=30 / SIDE)
     cover = Shape.of("box", (1, 1, 1), center=(0.3125, 0), half_size=(0.5, 0.6), angle=0, corner_radius=0)
     made = repainted(Scene(SIDE, SIDE, (Layer((circle,)), Layer((cover,))), (1, 1, 1)), shading, None)
@@ -96,7 +90,7 @@ def test_what_is_hidden_has_no_part_in_it():
 
 def test_what_is_cut_out_stays_cut_out():
     ring = disc(50, 44, 30) & ~disc(50, 44, 14)
-    shading = shading_of(painted((ring, ramp(HALF, RISE), 1.0)))
+    shading = shading_of(painted((ring, ramp(), 1.0)))
     outer, inner = (Shape.of("circle", middle_color(shading, 28), **WHERE, radius=r / SIDE) for r in (30, 14))
     scene = Scene(SIDE, SIDE, (Layer((outer, inner), joints=(Joint("subtraction", 0.0),)),), (1, 1, 1))
     (layer,) = repainted(scene, shading, None).layers
@@ -105,7 +99,7 @@ def test_what_is_cut_out_stays_cut_out():
 
 
 def test_a_ground_with_a_gradient_is_a_box_under_all():
-    pixels = painted((box(0, 0, SIDE, SIDE), ramp(HALF, RISE), 1.0), (disc(30, 30, 16), WHITE, 1.0))
+    pixels = painted((box(0, 0, SIDE, SIDE), ramp(), 1.0), (disc(30, 30, 16), WHITE, 1.0))
     shading = shading_of(pixels)
     color = shading.flats[shading.graded[0] - 1]
     ground = ground_shade(torch.tensor([*color, 1.0]), shading)
@@ -117,5 +111,5 @@ def test_a_ground_with_a_gradient_is_a_box_under_all():
 
 
 def test_no_layer_at_all():
-    shading = shading_of(painted((disc(50, 44, 30), ramp(HALF, RISE), 1.0)))
+    shading = shading_of(painted((disc(50, 44, 30), ramp(), 1.0)))
     assert repainted(Scene(SIDE, SIDE, (), (1, 1, 1)), shading, None).layers == ()

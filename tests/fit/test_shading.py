@@ -8,10 +8,7 @@ import pytest
 from sdf2vec.bench.known_scenes import known_scene
 from sdf2vec.fit.shading import Shading
 from sdf2vec.image import Picture
-from tests.fit.drawn import GREEN, SIDE, WHITE, box, disc, painted, ramp
-
-HALF = np.array([0.5, 0.3, 0.5])  # in the middle of the gradient
-RISE = np.array([0.4, 0.2, -0.4])  # of it from side to side
+from tests.fit.drawn import GREEN, HALF, RISE, SIDE, WHITE, box, disc, painted, ramp
 
 
 def shading_of(pixels):
@@ -24,7 +21,7 @@ def flattened(pixels):
 
 def test_a_shape_with_a_gradient_gets_one_colour_to_its_edge():
     mask = disc(50, 44, 30)
-    flat = flattened(painted((mask, ramp(HALF, RISE), 1.0)))
+    flat = flattened(painted((mask, ramp(), 1.0)))
     color = flat[44, 50]
     assert color == pytest.approx(HALF + RISE * 2 / SIDE, abs=0.01)
     assert (flat[30:58, 36:64] == color).all()
@@ -33,14 +30,14 @@ def test_a_shape_with_a_gradient_gets_one_colour_to_its_edge():
 
 def test_what_lies_on_a_gradient_stays():
     shapes = (disc(30, 30, 10), WHITE, 1.0), (box(50, 20, 70, 80), GREEN, 1.0)
-    ground = (box(0, 0, SIDE, SIDE), ramp(HALF, RISE), 1.0)
+    ground = (box(0, 0, SIDE, SIDE), ramp(), 1.0)
     flat = flattened(painted(ground, *shapes))
     assert np.abs(flat - painted(*shapes, ground=flat[90, 90])).max() < 0.02
 
 
 def test_what_has_the_colour_of_a_gradient_s_middle_at_its_end_is_still_seen():
     spot = (disc(80, 40, 10), HALF, 1.0)
-    pixels = painted((box(0, 0, SIDE, SIDE), ramp(HALF, RISE), 1.0), spot)
+    pixels = painted((box(0, 0, SIDE, SIDE), ramp(), 1.0), spot)
     flat = flattened(pixels)
     there, left = (np.linalg.norm(image[40, 80] - image[40, 66]) for image in (pixels, flat))
     assert left > 0.65 * there
@@ -49,21 +46,19 @@ def test_what_has_the_colour_of_a_gradient_s_middle_at_its_end_is_still_seen():
 def test_neither_do_thin_lines_vanish():
     """Five pixels across there is no other region, but its colour is seen."""
     line = (box(20, 40, 80, 42), WHITE, 1.0)
-    flat = flattened(painted((box(0, 0, SIDE, SIDE), ramp(HALF, RISE), 1.0), line))
+    flat = flattened(painted((box(0, 0, SIDE, SIDE), ramp(), 1.0), line))
     assert np.abs(flat - painted(line, ground=flat[90, 90])).max() < 0.02
 
 
 def test_two_parts_of_one_gradient_are_one_region_and_another_is_another():
     parts = box(5, 10, 40, 50) | box(56, 10, 90, 50)
-    shading = shading_of(
-        painted((parts, ramp(HALF, RISE), 1.0), (box(5, 60, 90, 90), ramp(HALF, -RISE), 1.0))
-    )
+    shading = shading_of(painted((parts, ramp(), 1.0), (box(5, 60, 90, 90), ramp(-RISE), 1.0)))
     assert len(shading.graded) == 2
     assert shading.labels[30, 20] == shading.labels[30, 70] != shading.labels[75, 50]
 
 
 def test_a_gradient_on_nothing():
-    pixels = painted((disc(50, 44, 30), ramp(HALF, RISE), 1.0))
+    pixels = painted((disc(50, 44, 30), ramp(), 1.0))
     alpha = painted((disc(50, 44, 30), np.zeros(3), 1.0))[..., :1]
     flat = flattened(np.concatenate([pixels, 1.0 - alpha], axis=2))
     assert np.ptp(flat[30:58, 36:64], axis=(0, 1)).max() == 0.0
@@ -72,7 +67,7 @@ def test_a_gradient_on_nothing():
 
 def test_a_large_picture_is_flattened_at_its_own_size():
     mask = disc(50, 44, 30)
-    flat = flattened(painted((mask, ramp(HALF, RISE), 1.0), finer=1))
+    flat = flattened(painted((mask, ramp(), 1.0), finer=1))
     assert flat.shape == (4 * SIDE, 4 * SIDE, 3)
     assert np.abs(flat - painted((mask, flat[176, 200], 1.0), finer=1)).max() < 0.02
 

@@ -16,6 +16,7 @@ import numpy as np
 from ...blend import EDGE_DEVIATION
 from ...grain import Drawable, Grain, Run
 from ...outlines import EllipseOutline, Outline, PolygonOutline
+from ...render.occlusion import showing
 from ...scene import Layer, Scene
 from .blur import best_traced, trial_of
 from .canvas import Canvas, pairs
@@ -25,7 +26,7 @@ from .refit_appearance import HASTY, Difference, refitted
 from .sampling import distances
 from .sharp_edges import NOWHERE, sharp_edge
 from .union_gradient import fill_of
-from .visibility import LayerSamples, contrasts, layers_at, showing
+from .visibility import LayerSamples, contrasts, layers_at
 
 # User units or, if that is more, pixels of the fitted picture that a traced contour may be off.
 TOLERANCE = 0.5, 0.15

@@ -18,9 +18,10 @@ import numpy as np
 
 from ...arrays import BoolArray, Float32Array, Float64Array
 from ...deferred import deferred
+from ...render.occlusion import showing
 from ...scene import Layer, Scene
 from .sampling import SampleGrid
-from .visibility import LayerSamples, showing, steps_over
+from .visibility import LayerSamples, steps_over
 
 CELLS = 64  # of a difference that is kept, along its longest side
 LARGEST = 2048  # layers: more equations than these are not solved

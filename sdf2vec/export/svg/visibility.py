@@ -9,6 +9,7 @@ import numpy as np
 
 from ...arrays import Float32Array, Float64Array
 from ...layer import is_flat
+from ...render.occlusion import showing
 from ...scene import Scene
 from .sampling import canvas_grid, colors, covers, extent
 
@@ -42,16 +43,6 @@ def contrasts(scene: Scene, samples: LayerSamples) -> Float64Array:
         shown = change[:3].mean(axis=0) + (0.0 if scene.opaque else change[3])
         found[i] = np.sum(soft[i] * shown * np.square(through[i])) / soft[i].sum()
     return found
-
-
-def showing(alphas: Float32Array) -> Float32Array:
-    """[N, P]: how much of each layer shows through those above it, from the alphas [N, P] of all, lowest first."""
-    through = np.ones_like(alphas)
-    for i in range(
-        len(alphas) - 1, 0, -1
-    ):  # row by row: numpy's cumprod along the first axis takes 40 times as long
-        np.multiply(through[i], 1.0 - alphas[i], out=through[i - 1])
-    return through
 
 
 def steps_over(alphas: Float32Array, colors: Float32Array, ground: Float64Array) -> Iterator[Float32Array]:

@@ -8,15 +8,11 @@ import torch
 
 from sdf2vec import Layer, Scene, Shape
 from sdf2vec.blend import JOINS
-from sdf2vec.export.svg.visibility import contrasts, layers_at, showing, steps_over
+from sdf2vec.export.svg.visibility import contrasts, layers_at, steps_over
 from sdf2vec.render import reference
 from sdf2vec.render.tensors import from_scene
 from sdf2vec.shapes import KINDS
 from tests.scenes import SOFT, random_layer
-
-
-def test_a_layer_shows_through_those_above():
-    assert showing(np.array([[0.5], [0.25], [0.5]])).tolist() == [[0.375], [0.5], [1.0]]
 
 
 def test_steps_are_from_what_lies_below():
