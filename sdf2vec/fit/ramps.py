@@ -62,15 +62,23 @@ def _plane(colors: torch.Tensor, points: Points) -> Plane:
     """The plane through as many colours [P, C] as can be: least squares of the nearest half, again and again."""
     x, y, _ = points
     rows = torch.stack([torch.ones_like(x), x, y], dim=1)
-    found = torch.linalg.lstsq(rows, colors).solution
+    found = _solved(rows, colors)
     explains = 1.0 - float((rows @ found - colors).square().sum() / (colors - colors.mean(0)).square().sum())
     for _ in range(ROUNDS):
         wrong = (rows @ found - colors).abs().amax(1)
         chosen = wrong <= wrong.median().clamp_min(NEAR)
-        found = torch.linalg.lstsq(rows[chosen], colors[chosen]).solution
+        found = _solved(rows[chosen], colors[chosen])
     wrong = (rows @ found - colors).abs().amax(1)
     near = wrong <= wrong.median().clamp_min(NEAR)
     return Plane(found[0], found[1:], near, explains)
+
+
+def _solved(rows: torch.Tensor, colors: torch.Tensor) -> torch.Tensor:
+    """The least squares solution [3, C], the shortest of many: across a picture a pixel wide there is no slope."""
+    found: torch.Tensor = torch.linalg.lstsq(
+        rows, colors, driver="gelsd"
+    ).solution  # the usual driver fails there
+    return found
 
 
 def _near(scene: SceneTensors, view: View) -> float:

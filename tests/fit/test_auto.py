@@ -106,9 +106,10 @@ def test_a_hole_through_two_layers_is_cut_out_of_both(drawn):
     assert all(layer.joints[0].join == "subtraction" for layer in scene.layers)
 
 
-def test_a_ramp_a_pixel_high_is_one_box():
+@pytest.mark.parametrize("axis", [0, 1])
+def test_a_ramp_a_pixel_high_or_wide_is_one_box(axis):
     """On a canvas three hundred times as wide as high a colour changes little across a scene unit."""
-    pixels = np.repeat(np.linspace(0, 1, 300, dtype=np.float32)[None, :, None], 3, axis=2)
+    pixels = np.repeat(np.expand_dims(np.linspace(0, 1, 300, dtype=np.float32), (axis, 2)), 3, axis=2)
     scene = fit(Picture(pixels))
     assert kinds_of(scene) == ["box"]
     assert quality(scene, Picture(pixels)).psnr >= 50
