@@ -11,6 +11,7 @@ from collections import Counter
 from collections.abc import Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
+from functools import partial
 from itertools import islice
 
 import numpy as np
@@ -25,34 +26,24 @@ from ..scene import Scene
 from ..threads import threads_of_its_own
 from .backends import CPU, choose
 from .byte_budget import Share, within
+from .descents import Sizes, finished, softer
 from .description import description_length
 from .digits import concise, fit_concisely
 from .initialization import FAINTEST_GROUND, Layers, background_of, empty_groups
 from .joining import Search
 from .loop import Callback, Progress, Stopped
 from .matching_pursuit import Painted, find_discs
+from .mending import SLIGHTLY, exchanged
 from .offers import common_color
 from .one_more import gain_of_one_more
+from .pruning import FLOOR, THOROUGH, USUAL, pruned
 from .ramps import KIND, grounded
 from .repainting import ground_shade, repainted
 from .settings import AUTO, Settings, preset_of
 from .shading import Shade, Shading
 from .simplify import sharing, simplified
-from .sparse import (
-    FLOOR,
-    THOROUGH,
-    USUAL,
-    Round,
-    Sizes,
-    error_of,
-    finished,
-    grow,
-    needed,
-    pruned,
-    softer,
-    taken_apart,
-)
-from .surroundings import View
+from .sparse import Round, grow, needed, taken_apart
+from .surroundings import View, error_of
 from .targets import meeting, missed, wanted
 from .views import scaled, view_of
 
@@ -346,14 +337,27 @@ class Drawing:
 
     def _finish(self) -> None:
         worst = 0.0 if self.settings.target_psnr is None else self.floor
-        self.scene = softer(self.scene, self.sizes.joint, self.search)
+        sizes, search = self.sizes, self.search
+        self.scene = softer(self.scene, sizes.joint, search)
+        if error_of(self.scene, sizes.joint) > self.floor:
+            self.scene = exchanged(self.scene, sizes, search, SLIGHTLY)
         few = self.scene.layer_count <= THOROUGHLY
         if worst or few:
             hope = THOROUGH if few else USUAL
-            self.scene = pruned(self.scene, self.sizes, self.search, worst or FLOOR, hope)
-        self.scene = simplified(self.scene, self.sizes.joint, self.search, worst)
-        self.scene = finished(self.scene, self.sizes, self.search)
-        self.scene = sharing(self.scene, self.sizes.last, worst)
+            self.scene = pruned(self.scene, sizes, search, worst or FLOOR, hope)
+        self.scene = simplified(self.scene, sizes.joint, search, worst)
+        self.scene = finished(self.scene, sizes, search)
+        self.scene = self._briefer(worst or FLOOR)
+        self.scene = sharing(self.scene, sizes.last, worst)
+
+    def _briefer(self, worst: float) -> SceneTensors:
+        """The scene without what is needless now that all is simple, where it is told as shortly."""
+        sizes, search = self.sizes, self.search
+        fewer = pruned(self.scene, sizes._replace(joint=sizes.last), search, worst)
+        if fewer.layer_count == self.scene.layer_count:
+            return self.scene
+        fewer = finished(fewer, sizes, search)
+        return min(fewer, self.scene, key=partial(description_length, view=sizes.last))
 
     def _is_no_drawing(self, made: Round) -> bool:
         """Whether far more shapes would be needed than there may be."""

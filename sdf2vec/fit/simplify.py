@@ -22,8 +22,7 @@ from ..shapes import KINDS
 from ..units import ANGLE, COLOR
 from .candidates import reductions
 from .joining import Search, inserted
-from .sparse import error_of
-from .surroundings import Surroundings, View, layer_at
+from .surroundings import Surroundings, View, error_of, layer_at
 
 STEPS = 10  # of a changed layer
 RISE = 1.02  # of the error, at most, by one change

@@ -45,6 +45,17 @@ def residual_of(scene: SceneTensors, view: View) -> torch.Tensor:
     return wrong if view.weights is None else wrong * view.weights
 
 
+@torch.no_grad()
+def error_of(scene: SceneTensors, view: View) -> float:
+    """The weighted mean squared error of a scene."""
+    return float(squared_error(scene, view))
+
+
+def squared_error(scene: SceneTensors, view: View) -> torch.Tensor:
+    """The same, differentiable."""
+    return residual_of(scene, view).square().mean()
+
+
 def some(scene: SceneTensors, which: Callable[[torch.Tensor], torch.Tensor]) -> SceneTensors:
     """The layers at some places of the draw order."""
     picked = [(group, which(group.order).nonzero()[:, 0]) for group in scene.groups]

@@ -12,13 +12,14 @@ from ..image import Picture
 from ..render.tensors import SceneTensors, from_scene, to_scene
 from ..scene import Scene
 from ..threads import threads_of_its_own
+from .descents import descended
+from .draw_order import without, without_all
 from .initialization import Layers
 from .joining import Search
 from .loop import Stopped
 from .presets import Phase
 from .settings import Settings, preset_of
-from .sparse import descended, error_of, without, without_all
-from .surroundings import View
+from .surroundings import View, error_of
 from .views import view_of
 
 RESOLUTION = 128  # pixels squared

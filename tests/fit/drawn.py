@@ -1,11 +1,18 @@
 """Pictures of 96 × 96 pixels drawn in numpy, by sixteen samples each: no renderer of this program has a part in it."""
 
 import numpy as np
+import torch
+
+from sdf2vec.fit.initialization import Layers
+from sdf2vec.fit.joining import Search
+from sdf2vec.fit.surroundings import View
+from sdf2vec.scene import Layer, Shape
 
 WHITE, BLUE, RED, GREEN = (
     np.array(c) for c in ((1, 1, 1), (0.1, 0.2, 0.8), (0.9, 0.1, 0.1), (0.2, 0.7, 0.3))
 )
 SIDE, FINER = 96, 4
+KINDS = ("circle", "ellipse", "box", "triangle")
 # of a gradient: its colour in the middle, and how much it rises from side to side
 HALF, RISE = np.array([0.5, 0.3, 0.5]), np.array([0.4, 0.2, -0.4])
 
@@ -39,3 +46,19 @@ def ramp(rise=RISE):
     """Colours [n, n, 3] of all samples that rise from the left to the right."""
     x, _ = points()
     return HALF + (x / SIDE - 0.5)[..., None] * rise
+
+
+def view_of(pixels):
+    return View(torch.from_numpy(np.ascontiguousarray(pixels.transpose(2, 0, 1))).float(), None)
+
+
+def search_of():
+    return Search(
+        Layers(KINDS, "over"), (0.0, 0.1), torch.Generator().manual_seed(0), lambda error: None, 1 / SIDE
+    )
+
+
+def sharp_disc(color, x, y, radius=20):
+    center = x / SIDE - 0.5, y / SIDE - 0.5
+    red, green, blue = map(float, color)
+    return Layer((Shape.of("circle", (red, green, blue), center=center, radius=radius / SIDE),))

@@ -14,9 +14,11 @@ from sdf2vec import Scene, Sdf2vecError, fit, fitted
 from sdf2vec.bench.known_scenes import known_scene
 from sdf2vec.fit import auto
 from sdf2vec.fit.auto import ground_of, is_flat
+from sdf2vec.fit.descents import finished
 from sdf2vec.fit.initialization import Layers
 from sdf2vec.fit.joining import Search
 from sdf2vec.fit.one_more import gain_of_one_more
+from sdf2vec.fit.pruning import FLOOR
 from sdf2vec.fit.settings import settings_of
 from sdf2vec.fit.sparse import Round
 from sdf2vec.fit.surroundings import View
@@ -24,6 +26,7 @@ from sdf2vec.image import Picture, load, resize
 from sdf2vec.quality import quality
 from sdf2vec.render.tensors import from_scene
 from sdf2vec.scene import Layer, Shape
+from tests.fit.drawn import BLUE, SIDE, disc, painted, sharp_disc
 from tests.fit.fitting import RED, remember
 
 WHITE = '<rect width="100%" height="100%" fill="white"/>'
@@ -419,6 +422,21 @@ def test_what_is_far_from_a_drawing_tries_all_numbers(found, off, tried, wanted,
     enough = auto._enough(picture, settings_of(max_shapes=48), scene, view, lambda progress: False)
     assert asked == tried
     assert enough.shape_count == wanted
+
+
+@pytest.mark.parametrize(
+    ("color", "radius", "layers"), [((0.999, 0.999, 0.999), 5.0, 1), ((0.85, 0.85, 0.85), 1.5, 2)]
+)
+def test_what_shortens_the_description_stays_even_where_nothing_seems_missing(color, radius, layers):
+    """Without a small grey dot the picture is 47 dB near; one of a quarter of a level does not pay for itself."""
+    pixels = painted((disc(40, 40, 20), BLUE, 1.0), (disc(80, 80, radius), color, 1.0))
+    drawing = auto.Drawing(
+        Picture(pixels.astype(np.float32)), settings_of(), lambda progress: False, flat=True
+    )
+    dot = sharp_disc(color, 80, 80, radius)
+    scene = from_scene(Scene(SIDE, SIDE, (sharp_disc(BLUE, 40, 40), dot), (1.0, 1.0, 1.0)))
+    drawing.scene = finished(scene, drawing.sizes, drawing.search)
+    assert drawing._briefer(FLOOR).layer_count == layers
 
 
 def test_a_round_that_only_takes_layers_away_does_not_end_the_search():

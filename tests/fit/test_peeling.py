@@ -6,22 +6,32 @@ import numpy as np
 import pytest
 import torch
 
-from sdf2vec.fit import peeling, sparse
+from sdf2vec.fit import descents, peeling, pruning, sparse
 from sdf2vec.fit.auto import Drawing
-from sdf2vec.fit.initialization import Layers
-from sdf2vec.fit.joining import Search
 from sdf2vec.fit.peeling import peeled
 from sdf2vec.fit.region_graph import Regions
 from sdf2vec.fit.settings import settings_of
-from sdf2vec.fit.surroundings import View
+from sdf2vec.fit.surroundings import View, error_of
 from sdf2vec.fit.transparency import bared, overlays
 from sdf2vec.fit.views import scaled
 from sdf2vec.image import Picture
 from sdf2vec.render.tensors import SceneTensors, from_scene, to_scene
-from sdf2vec.scene import Layer, Scene, Shape
-from tests.fit.drawn import BLUE, FINER, GREEN, RED, SIDE, WHITE, box, disc, painted, points
-
-KINDS = ("circle", "ellipse", "box", "triangle")
+from sdf2vec.scene import Scene
+from tests.fit.drawn import (
+    BLUE,
+    FINER,
+    GREEN,
+    RED,
+    SIDE,
+    WHITE,
+    box,
+    disc,
+    painted,
+    points,
+    search_of,
+    sharp_disc,
+    view_of,
+)
 
 
 def apart(pixels, *sides):
@@ -29,16 +39,6 @@ def apart(pixels, *sides):
     bare = SceneTensors([], torch.tensor([*WHITE, 1.0]).float(), "over", (1.0, 1.0))
     small = [View(scaled(pixels.astype(np.float32), side), None) for side in sides]
     return to_scene(peeled(bare, [*small, view_of(pixels)], search_of()), SIDE, SIDE).layers
-
-
-def view_of(pixels):
-    return View(torch.from_numpy(np.ascontiguousarray(pixels.transpose(2, 0, 1))).float(), None)
-
-
-def search_of():
-    return Search(
-        Layers(KINDS, "over"), (0.0, 0.1), torch.Generator().manual_seed(0), lambda error: None, 1 / SIDE
-    )
 
 
 # --- regions ------------------------------------------------------------------------------------------------
@@ -219,9 +219,9 @@ def test_layers_that_are_worth_little_each_are_not_all_taken_out():
     view = view_of(painted((box(0, 0, 30, SIDE), RED, 1.0), (mask, BLUE, 1.0)))
     layers = tuple(sharp_disc(BLUE, x, y, 3) for x, y in middles)
     scene = from_scene(Scene(SIDE, SIDE, layers, (1.0, 1.0, 1.0)))
-    sizes = sparse.Sizes(view, view, view)
-    left = sparse.pruned(scene, sizes, search_of())
-    assert sparse.error_of(left, view) <= 1.06 * sparse.error_of(scene, view)
+    sizes = descents.Sizes(view, view, view)
+    left = pruning.pruned(scene, sizes, search_of())
+    assert error_of(left, view) <= 1.06 * error_of(scene, view)
 
 
 def test_what_is_hardly_flat_anywhere_is_left():
@@ -251,13 +251,13 @@ def test_edges_become_as_soft_as_the_picture_has_them():
     sharp = from_scene(
         Scene(SIDE, SIDE, (sharp_disc(BLUE, 30, 30), sharp_disc(RED, 66, 64)), (1.0, 1.0, 1.0))
     )
-    still = sparse.descended(sharp, view, search, sparse.AFTER)
-    made = sparse.softer(sharp, view, search)
+    still = descents.descended(sharp, view, search, descents.AFTER)
+    made = descents.softer(sharp, view, search)
     first, second = to_scene(made, SIDE, SIDE).layers
     assert to_scene(still, SIDE, SIDE).layers[0].falloff * SIDE < 1.6
     assert first.falloff * SIDE == pytest.approx(3, rel=0.05)
     assert second.falloff * SIDE < 1.7  # what the sharpest edge of a pixel is
-    assert sparse.error_of(made, view) < 0.2 * sparse.error_of(still, view)
+    assert error_of(made, view) < 0.2 * error_of(still, view)
 
 
 def test_edges_stay_sharp_where_much_is_missing():
@@ -267,15 +267,11 @@ def test_edges_stay_sharp_where_much_is_missing():
     soft = 1 / (1 + np.exp(10 * np.hypot(x - 30, y - 30) / 8 - 5 - 10 * 20 / 8))
     view = view_of(pixels + soft[..., None] * (BLUE - pixels))
     sharp = from_scene(Scene(SIDE, SIDE, (sharp_disc(BLUE, 30, 30),), (1.0, 1.0, 1.0)))
-    made = sparse.descended(sparse._softened(sharp, sparse.SOFT, view), view, search_of(), sparse.AFTER)
-    assert sparse.error_of(made, view) < 0.6 * sparse.error_of(sharp, view)
-    assert sparse.softer(sharp, view, search_of()) is sharp
-
-
-def sharp_disc(color, x, y, radius=20):
-    center = x / SIDE - 0.5, y / SIDE - 0.5
-    red, green, blue = map(float, color)
-    return Layer((Shape.of("circle", (red, green, blue), center=center, radius=radius / SIDE),))
+    made = descents.descended(
+        descents.softened(sharp, descents.SOFT, view), view, search_of(), descents.AFTER
+    )
+    assert error_of(made, view) < 0.6 * error_of(sharp, view)
+    assert descents.softer(sharp, view, search_of()) is sharp
 
 
 @pytest.mark.parametrize(("most", "layers"), [(2, 2), (1, 0)])

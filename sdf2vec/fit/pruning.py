@@ -1,0 +1,92 @@
+"""Layers that a scene does as well without, taken out: verified by the error after a descent of the rest."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import NamedTuple
+
+from ..render.reference import layers_at
+from ..render.tensors import SceneTensors
+from .descents import AFTER, FEW, Sizes, descended, each_improved, softened
+from .draw_order import touching, without, without_all
+from .joining import Search
+from .least_squares import count_numbers
+from .surroundings import error_of, points_of
+
+FLOOR = 10**-4.4  # mean squared error, 44 dB: below it nothing is missing
+NEEDLESS = 1.05  # how much the error may rise by a layer taken out, after a descent
+LITTLE = 0.25  # at most, by this share of what a layer explains in the mean
+
+
+class Hope(NamedTuple):
+    """Which layers may turn out to be needless: so many of those that matter least, without which the error rises at
+    most so many times before a descent. The others begin that so soft or softer, in pixels of the picture where all
+    descend: what is sharp stays sharp.
+    """
+
+    tried: int
+    rise: float
+    softness: float = 0.0
+
+
+USUAL = Hope(2, 6.0)
+THOROUGH = Hope(6, 1000.0, 8.0)  # at the end: of two that do the work of one, either matters
+
+
+def pruned(
+    scene: SceneTensors, sizes: Sizes, search: Search, worst: float = FLOOR, hope: Hope = USUAL
+) -> SceneTensors:
+    """The scene without layers that it does as well without, or stays within the worst mean squared error."""
+    error, bare = error_of(scene, sizes.joint), error_of(replace(scene, groups=[]), sizes.joint)
+    while scene.layer_count:
+        little = LITTLE * max(bare - error, 0.0) / scene.layer_count
+        limit = max(error + min((NEEDLESS - 1.0) * error, little), worst)
+        fewer = _bare(scene, sizes, search, limit, hope) if hope.softness else None
+        fewer = fewer or _fewer(scene, sizes, search, limit, hope)
+        if fewer is None:
+            return scene
+        scene, error = fewer
+    return scene
+
+
+def _bare(
+    scene: SceneTensors, sizes: Sizes, search: Search, worst: float, hope: Hope
+) -> tuple[SceneTensors, float] | None:
+    """The scene without all smaller layers that touch one, and its error, if that is at most the worst.
+
+    Together they may be the soft edge of that one.
+    """
+    covers, _ = layers_at(scene, *points_of(scene, sizes.joint))
+    areas, beside = covers.sum(1), touching(scene, sizes.joint)
+    for order in areas.argsort(descending=True).tolist():
+        smaller = (beside[order] & (areas < areas[order])).nonzero()[:, 0].tolist()
+        if len(smaller) > 1:
+            fewer, error = _settled(without_all(scene, smaller), sizes, search, hope)
+            if error <= worst:
+                return fewer, error
+    return None
+
+
+def _settled(scene: SceneTensors, sizes: Sizes, search: Search, hope: Hope) -> tuple[SceneTensors, float]:
+    """The scene after a descent from softer edges, and its error."""
+    scene = softened(scene, hope.softness, sizes.joint)
+    if scene.layer_count <= FEW // 2:
+        scene = each_improved(scene, sizes.search, search)
+    scene = descended(scene, sizes.joint, search, AFTER)
+    return scene, error_of(scene, sizes.joint)
+
+
+def _fewer(
+    scene: SceneTensors, sizes: Sizes, search: Search, worst: float, hope: Hope
+) -> tuple[SceneTensors, float] | None:
+    """The scene without one of the layers that matter least, and its error, if that is at most the worst."""
+    rest = [without(scene, order) for order in range(scene.layer_count)]
+    tried = [(error_of(fewer, sizes.joint), fewer) for fewer in rest]
+    least = sorted(tried, key=lambda pair: pair[0])[: hope.tried]
+    hopeful = [pair for pair in least if pair[0] <= hope.rise * worst]
+    for error, fewer in sorted(hopeful, key=lambda pair: count_numbers(pair[1])):
+        if error > worst and fewer.layer_count:
+            fewer, error = _settled(fewer, sizes, search, hope)
+        if error <= worst:
+            return fewer, error
+    return None

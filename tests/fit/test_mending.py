@@ -1,0 +1,68 @@
+"""Layers thought of again: from scenes with mistakes in them, on pictures drawn in numpy."""
+
+import pytest
+
+from sdf2vec.fit import mending
+from sdf2vec.fit.descents import Sizes
+from sdf2vec.fit.surroundings import error_of
+from sdf2vec.render.tensors import from_scene, to_scene
+from sdf2vec.scene import Layer, Scene, Shape
+from tests.fit.drawn import BLUE, GREEN, RED, SIDE, WHITE, box, disc, painted, search_of, sharp_disc, view_of
+
+FLOOR = 10**-4.4
+
+
+def rgb(color):
+    red, green, blue = map(float, color)
+    return red, green, blue
+
+
+def triangle(color, *corners):
+    """A sharp one by its corners in pixels."""
+    a, b, c = ((x / SIDE - 0.5, y / SIDE - 0.5) for x, y in corners)
+    return Layer((Shape.of("triangle", rgb(color), a=a, b=b, c=c),))
+
+
+def mended(layers, way, pixels, more):
+    """The layers of a scene after one of the ways, which takes one thing more; and its error before and after."""
+    view = view_of(pixels)
+    scene = from_scene(Scene(SIDE, SIDE, layers, rgb(WHITE)))
+    made = way(scene, Sizes(view, view, view), search_of(), more)
+    return to_scene(made, SIDE, SIDE).layers, error_of(scene, view), error_of(made, view)
+
+
+def test_a_layer_is_found_anew_where_another_hid_what_it_is():
+    """A box of which a triangle was made, far off; the discs over and beside it are as they should be."""
+    pixels = painted(
+        (box(20, 30, 70, 62), BLUE, 1.0), (disc(70, 30, 14), RED, 1.0), (disc(24, 78, 12), GREEN, 1.0)
+    )
+    wrong = triangle(BLUE, (20, 30), (70, 62), (20, 62))
+    layers = wrong, sharp_disc(RED, 70, 30, 14), sharp_disc(GREEN, 24, 78, 12)
+    found, before, after = mended(layers, mending.replaced, pixels, FLOOR)
+    assert (len(found), found[0].shapes[0].kind) == (3, "box")
+    x, y, half_width, half_height = found[0].shapes[0].parameters[:4]
+    assert ((x + 0.5) * SIDE, (y + 0.5) * SIDE) == pytest.approx((45, 46), abs=0.3)
+    assert (half_width * SIDE, half_height * SIDE) == pytest.approx((25, 16), abs=0.3)
+    assert after < 0.01 * before
+
+
+def test_nothing_is_found_anew_where_nothing_is_missing():
+    pixels = painted((disc(40, 40, 20), BLUE, 1.0), (disc(70, 70, 14), RED, 1.0))
+    layers = sharp_disc(BLUE, 40, 40, 20), sharp_disc(RED, 70, 70, 14)
+    found, before, after = mended(layers, mending.replaced, pixels, FLOOR)
+    assert before < FLOOR
+    assert [layer.shapes[0] for layer in found] == [layer.shapes[0] for layer in layers]
+    assert after == before
+
+
+def test_shapes_are_exchanged_where_little_is_wrong_too():
+    """A small box that is a disc: a tenth of what is wrong in a disc that is too large."""
+    pixels = painted((disc(40, 40, 30), BLUE, 1.0), (disc(80, 80, 6), RED, 1.0))
+    middle, half = (80 / SIDE - 0.5,) * 2, (5.5 / SIDE,) * 2
+    square = Shape.of("box", rgb(RED), center=middle, half_size=half, angle=0.0, corner_radius=0.0)
+    layers = sharp_disc(BLUE, 40, 40, 33), Layer((square,))
+    kept, *_ = mended(layers, mending.exchanged, pixels, mending.WORST)
+    found, before, after = mended(layers, mending.exchanged, pixels, mending.SLIGHTLY)
+    assert kept[1].shapes[0].kind == "box"
+    assert found[1].shapes[0].kind in ("circle", "ellipse")
+    assert after < 0.05 * before
