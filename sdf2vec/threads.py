@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager
 from functools import cache
@@ -28,15 +28,25 @@ def threads_of_its_own() -> Iterator[None]:
         torch.set_num_threads(before)
 
 
-def in_threads(function: Callable[..., object], *arguments: Any) -> None:
-    """Runs function(first, step, …) in every thread, which is to take each step-th piece of work."""
-    count = threads()
+def in_threads(function: Callable[..., object], *arguments: Any, most: int | None = None) -> None:
+    """Runs function(first, step, …) in every thread, which is to take each step-th piece of work, of `most` at most."""
+    count = threads() if most is None else min(threads(), most)
     in_threads_each(lambda first: function(first, count, *arguments), range(count))
 
 
-def in_threads_each(function: Callable[[T], R], items: Iterable[T]) -> list[R]:
-    """The function's results for all items, computed in the pool's threads."""
-    return list(map(function, items) if threads() == 1 else _pool().map(function, items))
+def in_threads_each(function: Callable[[T], R], items: Sequence[T]) -> list[R]:
+    """The function's results for all items: every thread takes its share, this one, which need not be woken, too."""
+    count = min(threads(), len(items))
+    if count < 2:
+        return list(map(function, items))
+    shares = [items[first::count] for first in range(count)]
+    others = [_pool().submit(_each, function, share) for share in shares[1:]]
+    found = [_each(function, shares[0]), *(other.result() for other in others)]
+    return [found[index % count][index // count] for index in range(len(items))]
+
+
+def _each(function: Callable[[T], R], items: Sequence[T]) -> list[R]:
+    return list(map(function, items))
 
 
 def threads() -> int:
@@ -55,4 +65,4 @@ def available_cores() -> int:
 
 @cache
 def _pool() -> ThreadPoolExecutor:
-    return ThreadPoolExecutor(max(available_cores(), threads()), thread_name_prefix="sdf2vec")
+    return ThreadPoolExecutor(max(available_cores(), threads()) - 1, thread_name_prefix="sdf2vec")

@@ -21,6 +21,8 @@ from ..render.tiling import PIXELS
 from ..threads import in_threads, threads
 from .normal_kernels import add_products, sum_squares
 
+WORTH_A_THREAD = 10**6  # values of pixels, about half a millisecond; to wake one takes up to a fifth
+
 
 @cache
 def entries(structure: Structure, compositing: str, channels: int) -> tuple[Entry, Entry]:
@@ -85,7 +87,8 @@ class Laid:
         scratch = np.empty((threads(), values, PIXELS), np.float32)
         numbers = _array(torch.cat([self.points[2].expand(len(rows), 1), rows], dim=1))
         given = (numbers, *self._blocks, self._which(len(rows)), *self._targets, *rest)
-        in_threads(kernel, scratch, function, *given)
+        most = 1 + len(rows) * values * len(self.points[0]) // WORTH_A_THREAD
+        in_threads(kernel, scratch, function, *given, most=most)
 
     def _which(self, count: int) -> IntArray:
         """Which scale and offset each candidate has."""
