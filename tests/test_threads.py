@@ -29,17 +29,17 @@ def test_this_thread_does_its_share(three):
     assert len(set(found)) == 3
 
 
-def test_an_error_in_any_thread_is_raised(three):
-    for wrong in range(3):
-        with pytest.raises(ZeroDivisionError):
-            in_threads_each(lambda item, wrong=wrong: 1 / (item - wrong), range(3))
+@pytest.mark.parametrize("wrong", range(3))
+def test_an_error_in_any_thread_is_raised(three, wrong):
+    with pytest.raises(ZeroDivisionError):
+        in_threads_each(lambda item: 1 / (item - wrong), range(3))
 
 
 @pytest.mark.parametrize(("most", "steps"), [(None, 3), (2, 2), (1, 1), (9, 3)])
 def test_no_more_threads_than_asked_take_each_their_pieces(three, most, steps):
-    done = []
+    done: list[int] = []
     in_threads(lambda first, step, pieces: done.extend(pieces[first::step]), range(10), most=most)
-    firsts = []
+    firsts: list[tuple[int, int]] = []
     in_threads(lambda first, step: firsts.append((first, step)), most=most)
     assert sorted(done) == list(range(10))
     assert sorted(firsts) == [(first, steps) for first in range(steps)]
