@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from typing import NamedTuple
 
 from msgspec import structs
 
@@ -28,6 +29,14 @@ CLOSE = 1.12  # times the shapes that were too few: nothing between is tried
 TRIES = 4  # fits, before as many shapes are tried as there may be
 
 
+class Tried(NamedTuple):
+    """A fit of so many layers, and by how many dB it misses the target."""
+
+    layers: int
+    missed: float
+    scene: Scene
+
+
 def meeting(picture: Picture, settings: Settings, callback: Callback) -> tuple[Scene, bool]:
     """The scene of about the fewest shapes that meets the settings' targets; where none does, that of the most, and
     False.
@@ -36,15 +45,15 @@ def meeting(picture: Picture, settings: Settings, callback: Callback) -> tuple[S
     layers, slope, before = _foretold(picture, settings, callback, most)
     enough = ENOUGH if settings.target_flip is None else ENOUGH_FLIP
     low, high, best = 0, most + 1, None
-    scene: Scene | None = None
+    scene = before.scene if before and layers <= before.layers else None
     for number in range(1, TRIES + 2):
         some = structs.replace(settings, shapes=layers * settings.union)
         near_by = scene is not None and _apart(layers, len(scene.layers)) <= FAR
         scene = fit_concisely(picture, some, callback, scene if near_by else None)
         by = missed(scene, picture, settings)
-        if before and _apart(layers, before[0]) > APART:
-            slope = _steepness(layers, by, *before)
-        before = layers, by
+        if before and _apart(layers, before.layers) > APART:
+            slope = _steepness(layers, by, before)
+        before = Tried(layers, by, scene)
         if by > 0.0:
             low = layers
         else:
@@ -76,9 +85,9 @@ def wanted(settings: Settings) -> str:
 
 def _foretold(
     picture: Picture, settings: Settings, callback: Callback, most: int
-) -> tuple[int, float, tuple[int, float] | None]:
-    """With how many layers, at most so many, the target is to be tried first; dB that twice as many are worth; and by
-    how many dB how many layers are about to miss it, where that is known.
+) -> tuple[int, float, Tried | None]:
+    """With how many layers, at most so many, the target is to be tried first; dB that twice as many are worth; and a
+    short fit, where there is one, with by how many dB one as asked for is about to miss it.
     """
     begun = len(settings.start.layers) if settings.start else 0
     first = min(max(FIRST, 2 * begun), most)
@@ -87,17 +96,17 @@ def _foretold(
     nearer = NEARER[settings.preset]
     pilot = structs.replace(settings, preset=PILOT, trials=0, cuts=0)
 
-    def short_by(layers: int) -> float:
+    def tried(layers: int) -> Tried:
         scene = fit_picture(picture, structs.replace(pilot, shapes=layers * settings.union), callback)
-        return missed(scene, picture, settings) - nearer
+        return Tried(layers, missed(scene, picture, settings) - nearer, scene)
 
-    by = short_by(first)
-    second = min(_scaled(first, by, SLOPE), most)
+    before = tried(first)
+    second = min(_scaled(first, before.missed, SLOPE), most)
     if second == most or _apart(first, second) <= FAR:
-        return second, SLOPE, (first, by)
-    again = short_by(second)
-    slope = _steepness(second, again, first, by)
-    return min(_scaled(second, again, slope), most), slope, (second, again)
+        return second, SLOPE, before
+    again = tried(second)
+    slope = _steepness(second, again.missed, before)
+    return min(_scaled(second, again.missed, slope), most), slope, again
 
 
 def _apart(one: int, other: int) -> float:
@@ -105,9 +114,9 @@ def _apart(one: int, other: int) -> float:
     return max(one, 1) / max(other, 1) if one > other else max(other, 1) / max(one, 1)
 
 
-def _steepness(layers: int, by: float, others: int, others_by: float) -> float:
+def _steepness(layers: int, by: float, before: Tried) -> float:
     """How many dB twice as many are worth, from what two numbers of them, which are not about the same, miss."""
-    slope = (others_by - by) / math.log2(layers / others)
+    slope = (before.missed - by) / math.log2(layers / before.layers)
     return min(max(slope, STEEP[0]), STEEP[1])
 
 
