@@ -40,7 +40,8 @@ def in_threads_each(function: Callable[[T], R], items: Sequence[T]) -> list[R]:
     if count < 2:
         return list(map(function, items))
     shares = [items[first::count] for first in range(count)]
-    others = [_pool().submit(_each, function, share) for share in shares[1:]]
+    pool = _pool(threads() - 1)
+    others = [pool.submit(_each, function, share) for share in shares[1:]]
     found = [_each(function, shares[0]), *(other.result() for other in others)]
     return [found[index % count][index // count] for index in range(len(items))]
 
@@ -64,5 +65,5 @@ def available_cores() -> int:
 
 
 @cache
-def _pool() -> ThreadPoolExecutor:
-    return ThreadPoolExecutor(max(available_cores(), threads()) - 1, thread_name_prefix="sdf2vec")
+def _pool(workers: int) -> ThreadPoolExecutor:
+    return ThreadPoolExecutor(workers, thread_name_prefix="sdf2vec")
