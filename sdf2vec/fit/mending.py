@@ -21,9 +21,7 @@ WORST, SLIGHTLY = (
     0.01,
 )  # of all that is wrong, where a layer is whose shapes are exchanged; that is found anew
 TRIES = 12  # layers that are found anew in vain, one after the other
-PROMISING = (
-    3.0  # times the error before, of another shape in the place of one while the others are as they were
-)
+PROMISING = 3.0  # times the error before, of another shape in the place of one, the others as they were
 RETHOUGHT = 2  # colours whose layers are found anew in a round, at most
 
 
@@ -42,16 +40,11 @@ def rethought(scene: SceneTensors, sizes: Sizes, search: Search, floor: float) -
 
 def replaced(scene: SceneTensors, sizes: Sizes, search: Search, floor: float) -> SceneTensors:
     """The scene with one layer after the other found anew, those first where most is wrong, while that helps."""
-    error, vain = error_of(scene, sizes.joint), set[int]()
-    while error > floor and len(vain) < TRIES:
-        worst = [order for order in _faulty(scene, sizes.joint, SLIGHTLY) if order not in vain]
-        if not worst:
-            break
-        vain.add(worst[0])
-        made = _anew(scene, worst[:1], sizes, search, floor)
-        now = error if made is None else error_of(made, sizes.joint)
-        if made is not None and now < MOVED * error:
-            scene, error, vain = made, now, set()
+    error, worst = error_of(scene, sizes.joint), _faulty(scene, sizes.joint, SLIGHTLY)[:TRIES]
+    while worst and error > floor:
+        made = _anew(scene, [worst.pop(0)], sizes, search, floor)
+        if made is not None and (now := error_of(made, sizes.joint)) < MOVED * error:
+            scene, error, worst = made, now, _faulty(made, sizes.joint, SLIGHTLY)[:TRIES]
     return pruned(scene, sizes, search, floor)
 
 

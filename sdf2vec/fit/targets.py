@@ -29,7 +29,7 @@ CLOSE = 1.12  # times the shapes that were too few: nothing between is tried
 TRIES = 4  # fits, before as many shapes are tried as there may be
 
 
-class Tried(NamedTuple):
+class Attempt(NamedTuple):
     """A fit of so many layers, and by how many dB it misses the target."""
 
     layers: int
@@ -53,7 +53,7 @@ def meeting(picture: Picture, settings: Settings, callback: Callback) -> tuple[S
         by = missed(scene, picture, settings)
         if before and _apart(layers, before.layers) > APART:
             slope = _steepness(layers, by, before)
-        before = Tried(layers, by, scene)
+        before = Attempt(layers, by, scene)
         if by > 0.0:
             low = layers
         else:
@@ -85,7 +85,7 @@ def wanted(settings: Settings) -> str:
 
 def _foretold(
     picture: Picture, settings: Settings, callback: Callback, most: int
-) -> tuple[int, float, Tried | None]:
+) -> tuple[int, float, Attempt | None]:
     """With how many layers, at most so many, the target is to be tried first; dB that twice as many are worth; and a
     short fit, where there is one, with by how many dB one as asked for is about to miss it.
     """
@@ -96,9 +96,9 @@ def _foretold(
     nearer = NEARER[settings.preset]
     pilot = structs.replace(settings, preset=PILOT, trials=0, cuts=0)
 
-    def tried(layers: int) -> Tried:
+    def tried(layers: int) -> Attempt:
         scene = fit_picture(picture, structs.replace(pilot, shapes=layers * settings.union), callback)
-        return Tried(layers, missed(scene, picture, settings) - nearer, scene)
+        return Attempt(layers, missed(scene, picture, settings) - nearer, scene)
 
     before = tried(first)
     second = min(_scaled(first, before.missed, SLOPE), most)
@@ -114,7 +114,7 @@ def _apart(one: int, other: int) -> float:
     return max(one, 1) / max(other, 1) if one > other else max(other, 1) / max(one, 1)
 
 
-def _steepness(layers: int, by: float, before: Tried) -> float:
+def _steepness(layers: int, by: float, before: Attempt) -> float:
     """How many dB twice as many are worth, from what two numbers of them, which are not about the same, miss."""
     slope = (before.missed - by) / math.log2(layers / before.layers)
     return min(max(slope, STEEP[0]), STEEP[1])

@@ -5,7 +5,9 @@ import torch
 
 from sdf2vec.fit.initialization import Layers
 from sdf2vec.fit.joining import Search
+from sdf2vec.fit.shading import Shading
 from sdf2vec.fit.surroundings import View
+from sdf2vec.image import Picture
 from sdf2vec.scene import Layer, Shape
 
 WHITE, BLUE, RED, GREEN = (
@@ -62,3 +64,7 @@ def sharp_disc(color, x, y, radius=20):
     center = x / SIDE - 0.5, y / SIDE - 0.5
     red, green, blue = map(float, color)
     return Layer((Shape.of("circle", (red, green, blue), center=center, radius=radius / SIDE),))
+
+
+def shading_of(pixels):
+    return Shading.of(Picture(pixels.astype(np.float32)))

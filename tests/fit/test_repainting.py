@@ -11,8 +11,7 @@ import torch
 from sdf2vec.fit.repainting import ground_shade, repainted
 from sdf2vec.render import reference
 from sdf2vec.scene import Joint, Layer, Scene, Shape
-from tests.fit.drawn import HALF, RED, RISE, SIDE, WHITE, box, disc, painted, points, ramp
-from tests.fit.test_shading import shading_of
+from tests.fit.drawn import HALF, RED, RISE, SIDE, WHITE, box, disc, painted, points, ramp, shading_of
 
 WHERE: dict[str, Any] = {"center": ((50 - 48) / SIDE, (44 - 48) / SIDE)}  # that disc in scene units
 BOX: dict[str, Any] = {"half_size": (30 / SIDE, 20 / SIDE), "corner_radius": 0.0, "angle": 0.4}

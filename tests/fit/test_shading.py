@@ -8,11 +8,7 @@ import pytest
 from sdf2vec.bench.known_scenes import known_scene
 from sdf2vec.fit.shading import Shading
 from sdf2vec.image import Picture
-from tests.fit.drawn import GREEN, HALF, RISE, SIDE, WHITE, box, disc, painted, ramp
-
-
-def shading_of(pixels):
-    return Shading.of(Picture(pixels.astype(np.float32)))
+from tests.fit.drawn import GREEN, HALF, RISE, SIDE, WHITE, box, disc, painted, ramp, shading_of
 
 
 def flattened(pixels):

@@ -6,9 +6,7 @@ from sdf2vec.render import reference
 from sdf2vec.render.tensors import from_scene
 
 VALUES, GRADIENTS = 1e-4, 1e-3
-SURELY = (
-    0.1  # share of these that what is well conditioned is off at most by the rounding of single precision
-)
+SURELY = 0.1  # share of these that what is well conditioned is off at most in single precision
 
 
 def outcome(composite, tensors, size):
