@@ -339,7 +339,7 @@ class Drawing:
         worst = 0.0 if self.settings.target_psnr is None else self.floor
         sizes, search = self.sizes, self.search
         self.scene = softer(self.scene, sizes.joint, search)
-        if error_of(self.scene, sizes.joint) > self.floor:
+        if error_of(self.scene, sizes.joint) > worst:
             self.scene = exchanged(self.scene, sizes, search, SLIGHTLY)
         few = self.scene.layer_count <= THOROUGHLY
         if worst or few:

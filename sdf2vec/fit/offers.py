@@ -18,7 +18,6 @@ from torch.nn.functional import max_pool2d
 
 from ..deferred import deferred
 from ..layer import row_width
-from ..render.reference import rows_coverage
 from ..render.tensors import Group
 from ..scene import Color
 from .candidates import Opening, alone, cut_from
@@ -271,8 +270,8 @@ def _offers_of(
     """What layers with these rows [N, U] gain; None for those that cover nothing of their region."""
     structure = like.structure
     before = around.residual().square().mean(0).flatten()
-    after = around.wrong(layer_of(structure, like.order, rows)).square().mean(1)
-    covers, _ = rows_coverage(structure, rows[..., None], around.scene.compositing, *around.points)
+    covers, wrong = around.laid(structure, rows)
+    after = wrong.square().mean(1)
     made: list[Offer | None] = []
     for row, region, cover, rest in zip(rows, regions, covers, after, strict=True):
         part = region.under(cover)

@@ -12,7 +12,7 @@ import torch
 
 from ..layer import ROW_OPACITY, Structure
 from ..render import fused
-from ..render.reference import canvas, composite_points, lay, rows_coverage
+from ..render.reference import canvas, lay, rows_coverage
 from ..render.tensors import Group, SceneTensors
 from .laying import Laid
 from .levenberg import Dense, Problem
@@ -40,9 +40,14 @@ def points_of(scene: SceneTensors, view: View) -> Points:
 
 def residual_of(scene: SceneTensors, view: View) -> torch.Tensor:
     """How far a scene is from a picture, weighted, [C, H, W]; differentiable."""
-    channels, height, width = view.target.shape
-    wrong = fused.composite(scene, width, height, channels) - view.target
+    wrong = _drawn(scene, view) - view.target
     return wrong if view.weights is None else wrong * view.weights
+
+
+def _drawn(scene: SceneTensors, view: View) -> torch.Tensor:
+    """A scene at the size of a picture and with its channels, [C, H, W]; differentiable."""
+    channels, height, width = view.target.shape
+    return fused.composite(scene, width, height, channels)
 
 
 @torch.no_grad()
@@ -83,22 +88,20 @@ class Surroundings:
     points: Points
     target: torch.Tensor  # [C, H, W] premultiplied
     weights: torch.Tensor  # [P]
-    below: torch.Tensor  # [4, P]
-    dark: torch.Tensor  # [4, P]
-    light: torch.Tensor  # [4, P]
+    below: torch.Tensor  # [C, P]
+    dark: torch.Tensor  # [C, P]
+    light: torch.Tensor  # [C, P]
     scene: SceneTensors
 
     @classmethod
     def of(cls, scene: SceneTensors, order: int, view: View) -> Surroundings:
         """Those of the layer at this place in the draw order."""
         points = points_of(scene, view)
-        below = some(scene, lambda place: place < order)
-        above = some(scene, lambda place: place > order)
-        dark, light = (
-            composite_points(replace(above, background=torch.full((4,), end)), *points) for end in (0.0, 1.0)
-        )
+        below, above = (some(scene, partial(side, order)) for side in (operator.gt, operator.lt))
+        seen = [below, *(replace(above, background=torch.full((4,), end)) for end in (0.0, 1.0))]
+        drawn, dark, light = (_drawn(each, view).flatten(1) for each in seen)
         own = torch.ones_like(points[0]) if view.weights is None else view.weights.flatten()
-        return cls(points, view.target, own, composite_points(below, *points), dark, light, scene)
+        return cls(points, view.target, own, drawn, dark, light, scene)
 
     @property
     def shape(self) -> tuple[int, int]:
@@ -125,26 +128,31 @@ class Surroundings:
         """
         if len(structure) > MOST_COMPILED and len(self.weights) < GLANCE:
             weights = 1.0 if counts is None else counts[:, None]
-            return Dense(lambda rows: self._wrong_at(structure, rows) * weights, len(self.weights))
+            return Dense(lambda rows: self._laid_at(structure, rows)[1] * weights, len(self.weights))
         weights = self.weights[None] if counts is None else self.weights * counts
-        channels = len(self.target)
-        scale = (self.light - self.dark)[:channels] * weights[:, None]
-        offset = (self.target.flatten(1) - self.dark[:channels]) * weights[:, None]
-        return Laid(structure, self.scene.compositing, self.points, self.below[:channels], scale, offset)
+        scale = (self.light - self.dark) * weights[:, None]
+        offset = (self.target.flatten(1) - self.dark) * weights[:, None]
+        return Laid(structure, self.scene.compositing, self.points, self.below, scale, offset)
 
     def wrong(self, layers: Group) -> torch.Tensor:
         """What is wrong with each of some layers in the place of this one, weighted, [G, C, P]."""
-        return self._wrong_at(layers.structure, layers.rows()[..., None])
+        return self.laid(layers.structure, layers.rows())[1]
 
-    def _wrong_at(self, structure: Structure, rows: torch.Tensor) -> torch.Tensor:
+    def laid(self, structure: Structure, rows: torch.Tensor) -> tuple[torch.Tensor, torch.Tensor]:
+        """Coverage [G, P] of layers with these rows [G, U] in the place of this one, and what is wrong with each."""
+        return self._laid_at(structure, rows[..., None])
+
+    def _laid_at(self, structure: Structure, rows: torch.Tensor) -> tuple[torch.Tensor, torch.Tensor]:
         """The same from rows [G, U, P or 1]."""
         cover, color = rows_coverage(structure, rows, self.scene.compositing, *self.points)
-        return self.wrong_with(cover, color, rows[:, ROW_OPACITY - 1])
+        return cover, self.wrong_with(cover, color, rows[:, ROW_OPACITY - 1])
 
     def wrong_with(self, cover: torch.Tensor, color: torch.Tensor, opacity: torch.Tensor) -> torch.Tensor:
-        """The same [G, C, P] from coverage [G, P], colours [G, 3, P or 1] and opacities [G, P or 1]."""
+        """What is wrong with layers, weighted, [G, C, P], from coverage [G, P], colours [G, 3, P or 1] and opacities
+        [G, P or 1].
+        """
         laid = lay(self.scene.compositing, self.below, color, opacity, cover)
-        seen = (self.dark + (self.light - self.dark) * laid)[..., : len(self.target), :]
+        seen = self.dark + (self.light - self.dark) * laid
         return (seen - self.target.flatten(1)) * self.weights
 
     def error(self, layer: Group) -> float:
@@ -153,9 +161,8 @@ class Surroundings:
 
     def shown(self) -> torch.Tensor:
         """The picture [C, P] as this place should show it: without what lies above, where that lets enough through."""
-        channels, target = len(self.target), self.target.flatten(1)
-        through = (self.light - self.dark)[:channels]
-        below = (target - self.dark[:channels]) / through.clamp_min(SEEN)
+        target, through = self.target.flatten(1), self.light - self.dark
+        below = (target - self.dark) / through.clamp_min(SEEN)
         return torch.where(through > SEEN, below.clamp(0.0, 1.0), target)
 
     def residual(self) -> torch.Tensor:

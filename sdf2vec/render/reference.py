@@ -114,9 +114,14 @@ def composite_points(
 def lay(
     compositing: str, below: torch.Tensor, color: torch.Tensor, opacity: torch.Tensor, cover: torch.Tensor
 ) -> torch.Tensor:
-    """Layers, each on what is below it [4, P]: colours [..., 3, P or 1], opacities [..., P or 1], coverage [..., P]."""
+    """Layers, each on what is below it [4, P]: colours [..., 3, P or 1], opacities [..., P or 1], coverage [..., P].
+
+    Of three channels the colours alone.
+    """
     blend_color, blend_alpha = _blending(compositing)
     (rgb,) = blend_color(below[:3], color, opacity[..., None, :], cover[..., None, :])
+    if len(below) == 3:
+        return rgb
     (alpha,) = blend_alpha(below[3], opacity, cover)
     return torch.cat([rgb, alpha[..., None, :]], dim=-2)
 
