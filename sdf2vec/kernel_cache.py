@@ -19,7 +19,7 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from threading import RLock
 from types import FunctionType, ModuleType
-from typing import Any, NamedTuple
+from typing import Any
 
 import llvmlite
 from llvmlite import binding
@@ -40,17 +40,19 @@ C_TYPES: dict[str, Any] = {
 _compiling = RLock()
 
 
-class Entry(NamedTuple):
+@dataclass(frozen=True)
+class Entry:
     """A function of an assembly."""
 
     assembly: Assembly
     name: str
 
-    @property
+    @cached_property
     def address(self) -> int:
         """Where its machine code is, from now on."""
         with _compiling:
-            return _address(self)
+            _add(self.assembly)
+            return int(_machine().get_function_address(f"{self.assembly.stem}.{self.name}"))
 
 
 @dataclass(frozen=True)
@@ -163,12 +165,6 @@ def _machine() -> Any:
     """What holds the machine code of this process."""
     target = _target_machine()
     return binding.create_mcjit_compiler(binding.parse_assembly(""), target)
-
-
-@cache
-def _address(entry: Entry) -> int:
-    _add(entry.assembly)
-    return int(_machine().get_function_address(f"{entry.assembly.stem}.{entry.name}"))
 
 
 @cache

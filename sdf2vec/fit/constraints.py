@@ -24,15 +24,25 @@ GOLDEN = 2.39996  # radians; multiples of it never meet
 @torch.no_grad()
 def project(tensors: SceneTensors, pixel: float, falloff: tuple[float, float] = (0.0, LONGEST)) -> None:
     """Moves every value into its range, in place; `pixel` is the size of a pixel of the picture in scene units."""
-    room = Room(tensors.size, pixel, falloff, COMPOSITING[tensors.compositing].signed)
+    room = room_of(tensors, pixel, falloff)
     for group in tensors.groups:
-        for slot, values in group.values.items():
-            slot.parameter.unit.project(values, slot.parameter.positive, room)
-        for index, part in enumerate(group.structure):
-            for name, other in KINDS[part.kind].at_most:  # where it changes nothing, nothing would move it
-                group.of(name, index).clamp_(max=ALMOST * group.of(other, index).amin(1, keepdim=True))
+        project_group(group, room)
     BACKGROUND.project(tensors.background, False, room)
     tensors.background.clamp_(max=tensors.background[3].clone())  # premultiplied
+
+
+def room_of(tensors: SceneTensors, pixel: float, falloff: tuple[float, float]) -> Room:
+    """What the ranges of a scene's numbers depend on."""
+    return Room(tensors.size, pixel, falloff, COMPOSITING[tensors.compositing].signed)
+
+
+def project_group(group: Group, room: Room) -> None:
+    """Moves the values of some layers into their range, in place."""
+    for slot, values in group.values.items():
+        slot.parameter.unit.project(values, slot.parameter.positive, room)
+    for index, part in enumerate(group.structure):
+        for name, other in KINDS[part.kind].at_most:  # where it changes nothing, nothing would move it
+            group.of(name, index).clamp_(max=ALMOST * group.of(other, index).amin(1, keepdim=True))
 
 
 def enforce_min_thickness(tensors: SceneTensors, least: float) -> None:

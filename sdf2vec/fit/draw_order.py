@@ -10,8 +10,7 @@ import torch
 
 from ..render.reference import layers_at
 from ..render.tensors import SceneTensors
-from .joining import inserted
-from .surroundings import View, error_of, layer_at, points_of, some
+from .surroundings import View, error_of, points_of, some
 
 MOVED = 0.98  # of the error, at most, after a layer was moved
 UNSEEN = 0.5 / 255  # coverage
@@ -42,14 +41,23 @@ def reordered(scene: SceneTensors, view: View) -> SceneTensors:
     """The scene with each layer at the place of the draw order where the error is least."""
     error, beside = error_of(scene, view), touching(scene, view)
     for order in range(scene.layer_count):
-        layer, rest = layer_at(scene, order), without(scene, order)
+        start = scene
         touched = [other - (other > order) for other in beside[order].nonzero()[:, 0].tolist()]
         for place in _other_places(order, touched):
-            moved = inserted(opened(rest, place), replace(layer, order=torch.tensor([place])))
-            found = error_of(moved, view)
+            tried = moved(start, order, place)
+            found = error_of(tried, view)
             if found < MOVED * error:
-                scene, error, beside = moved, found, touching(moved, view)
+                scene, error, beside = tried, found, touching(tried, view)
     return scene
+
+
+def moved(scene: SceneTensors, order: int, place: int) -> SceneTensors:
+    """The scene with one layer at another place of the draw order."""
+    others = [other for other in range(scene.layer_count) if other != order]
+    others.insert(place, order)
+    places = torch.tensor(others).argsort()
+    groups = [replace(group, order=places[group.order]) for group in scene.groups]
+    return replace(scene, groups=groups)
 
 
 def touching(scene: SceneTensors, view: View) -> torch.Tensor:

@@ -21,7 +21,7 @@ from ..shapes import KINDS
 from ..units import FALLOFF, SMOOTHNESS
 from .adam import rate_of
 from .candidates import Opening, Proposer, Tried, alone, openings, reductions
-from .constraints import project
+from .constraints import project_group, room_of
 from .initialization import Layers, straight
 from .levenberg import Numbers, descend
 from .surroundings import Surroundings, View, layer_at, points_of, some
@@ -271,15 +271,14 @@ class Search:
 
     def numbers(self, around: Surroundings, structure: Structure, moves: Callable[[Slot], bool]) -> Numbers:
         """Which numbers of a structure's rows move, how far in one step, and what keeps them in their range."""
-        scene = around.scene
+        scene, bottom = around.scene, torch.zeros(1, dtype=torch.int64)
         every = [moves(slot) for slot in slots(structure) for _ in range(slot.parameter.width)]
-        free = torch.tensor(every).nonzero()[:, 0]
-
-        def keep(rows: torch.Tensor) -> None:
-            group = layer_of(structure, torch.zeros(1, dtype=torch.int64), rows)
-            project(replace(scene, groups=[group]), self.pixel, self.falloff)
-
-        return Numbers(free, longest_steps(structure, scene)[free], keep)
+        room = room_of(scene, self.pixel, self.falloff)
+        return Numbers.where(
+            every,
+            longest_steps(structure, scene),
+            lambda rows: project_group(layer_of(structure, bottom, rows), room),
+        )
 
 
 def longest_steps(structure: Structure, scene: SceneTensors) -> torch.Tensor:

@@ -19,6 +19,7 @@ from ..lower.llvm import assembled, forward
 from ..render.kernels import carried, drawn
 from ..render.tiling import PIXELS
 from ..threads import in_threads, threads
+from .levenberg import Equations
 from .normal_kernels import add_products, sum_squares
 
 WORTH_A_THREAD = 10**6  # values of pixels, about half a millisecond; to wake one takes up to a fifth
@@ -59,20 +60,20 @@ class Laid:
     scale: torch.Tensor  # [G or 1, C, P]
     offset: torch.Tensor  # [G or 1, C, P]
 
-    def errors(self, rows: torch.Tensor) -> torch.Tensor:
+    def errors(self, rows: torch.Tensor) -> Float64Array:
         """Mean squares [G] for rows [G, U]."""
         sums = np.zeros(len(rows))
-        self._run(sum_squares, 0, len(self.below), rows, sums)
-        return torch.from_numpy(sums / self.below.numel()).to(rows.dtype)
+        self._run(sum_squares, 0, 1, rows, sums)
+        sums /= self.below.numel()
+        return sums
 
-    def normal(self, rows: torch.Tensor, free: torch.Tensor) -> tuple[torch.Tensor, torch.Tensor]:
+    def normal(self, rows: torch.Tensor, free: IntArray) -> Equations:
         """The normal equations by the free numbers."""
         count, width = rows.shape
         normal, right = np.zeros((count, len(free), len(free))), np.zeros((count, len(free)))
-        values = len(self.below) * (2 + width)
-        self._run(add_products, 1, values, rows, free.numpy(), normal, right)
+        self._run(add_products, 1, 2 + width, rows, free, normal, right)
         normal += np.tril(normal, -1).transpose(0, 2, 1)
-        return torch.from_numpy(normal).to(rows.dtype), torch.from_numpy(right).to(rows.dtype)
+        return normal, right
 
     def _run(
         self,
@@ -82,17 +83,34 @@ class Laid:
         rows: torch.Tensor,
         *rest: Float64Array | IntArray,
     ) -> None:
-        """Calls a kernel with scratch for so many values of a pixel."""
-        function = entries(self.structure, self.compositing, len(self.below))[entry].address
-        scratch = np.empty((threads(), values, PIXELS), np.float32)
-        numbers = _array(torch.cat([self.points[2].expand(len(rows), 1), rows], dim=1))
-        given = (numbers, *self._blocks, self._which(len(rows)), *self._targets, *rest)
-        most = 1 + len(rows) * values * len(self.points[0]) // WORTH_A_THREAD
-        in_threads(kernel, scratch, function, *given, most=most)
+        """Calls a kernel with scratch for so many values of each channel of a pixel."""
+        channels, points = self.below.shape
+        count, width = rows.shape
+        numbers = np.empty((count, 1 + width), np.float32)
+        numbers[:, 0], numbers[:, 1:] = self._pixel, rows.numpy()
+        scratch = np.empty((threads(), channels * values, PIXELS), np.float32)
+        given = (
+            self._entries[entry].address,
+            numbers,
+            *self._blocks,
+            self._which(count),
+            *self._targets,
+            *rest,
+        )
+        most = 1 + count * channels * values * points // WORTH_A_THREAD
+        in_threads(kernel, scratch, *given, most=most)
 
     def _which(self, count: int) -> IntArray:
         """Which scale and offset each candidate has."""
-        return np.arange(count, dtype=np.int64) if len(self.scale) > 1 else np.zeros(count, np.int64)
+        return np.arange(count, dtype=np.int64) if self.scale.shape[0] > 1 else np.zeros(count, np.int64)
+
+    @cached_property
+    def _entries(self) -> tuple[Entry, Entry]:
+        return entries(self.structure, self.compositing, self.below.shape[0])
+
+    @cached_property
+    def _pixel(self) -> float:
+        return float(self.points[2])
 
     @cached_property
     def _blocks(self) -> Sequence[Float32Array]:

@@ -15,7 +15,7 @@ from itertools import accumulate
 import numpy as np
 import torch
 
-from ..arrays import Float32Array, IntArray
+from ..arrays import Float32Array, Float64Array, IntArray
 from ..layer import Slot, row_width
 from ..render import fused
 from ..render.reference import canvas_axes
@@ -27,11 +27,9 @@ from .adam import rate_of
 from .constraints import enforce_min_thickness, project
 from .joining import LONGEST_STEP, Search, detached, layer_of, longest_steps
 from .laying import entries
-from .levenberg import Numbers, descend
+from .levenberg import Equations, Numbers, descend
 from .normal_kernels import add_scene_products
-from .surroundings import View, residual_of
-
-Equations = tuple[torch.Tensor, torch.Tensor]
+from .surroundings import View, error_of
 
 
 def improved(
@@ -98,24 +96,23 @@ class SceneProblem:
 
     def numbers(self, keep: Callable[[SceneTensors], None], stays: Callable[[Slot, float], bool]) -> Numbers:
         """Which move, how far in one step, and what keeps them in their range; the ground's where it is opaque."""
-        free, steps = [], []
+        moves, steps = [], []
         for group in self.scene.groups:
             slots = [slot for slot in group.values for _ in range(slot.parameter.width)]
             for row in group.rows().tolist():
-                free += [not stays(slot, value) for slot, value in zip(slots, row, strict=True)]
+                moves += [not stays(slot, value) for slot, value in zip(slots, row, strict=True)]
             steps.append(longest_steps(group.structure, self.scene).repeat(len(group)))
         grounds = min(self.channels, 3) if self.scene.opaque else 0
-        free += [True] * grounds
+        moves += [True] * grounds
         side = math.sqrt(self.scene.size[0] * self.scene.size[1])
         steps.append(torch.full((grounds,), rate_of(BACKGROUND, side, LONGEST_STEP)))
-        moving = torch.tensor(free, dtype=torch.bool).nonzero()[:, 0]
-        return Numbers(moving, torch.cat(steps)[moving], lambda row: keep(self.scene_of(row)))
+        return Numbers.where(moves, torch.cat(steps), lambda row: keep(self.scene_of(row)))
 
-    def errors(self, rows: torch.Tensor) -> torch.Tensor:
+    def errors(self, rows: torch.Tensor) -> Float64Array:
         """The mean square [1]."""
-        return residual_of(self.scene_of(rows), self.view).square().mean()[None]
+        return np.array([error_of(self.scene_of(rows), self.view)])
 
-    def normal(self, rows: torch.Tensor, free: torch.Tensor) -> Equations:
+    def normal(self, rows: torch.Tensor, free: IntArray) -> Equations:
         """The normal equations by the free numbers."""
         scene = self.scene_of(rows)
         _, height, width = self.view.target.shape
@@ -136,11 +133,9 @@ class SceneProblem:
             normal,
             right,
         )
-        chosen = free.numpy()
-        lower = normal.sum(axis=0)[np.ix_(chosen, chosen)]
+        lower = normal.sum(axis=0)[np.ix_(free, free)]
         both = lower + np.tril(lower, -1).T
-        sums = right.sum(axis=0)[chosen]
-        return torch.from_numpy(both[None]).to(rows.dtype), torch.from_numpy(sums[None]).to(rows.dtype)
+        return both[None], right.sum(axis=0)[free][None]
 
     def _layers(self, scene: SceneTensors, order: IntArray, kinds: IntArray) -> tuple[IntArray, ...]:
         """Kernels, and of each layer in draw order: which it has, how many numbers, and where they begin in a row."""

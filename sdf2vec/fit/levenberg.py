@@ -6,10 +6,15 @@ derivatives come from one pass backward in which every point has numbers of its 
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import NamedTuple, Protocol
 
+import numpy as np
 import torch
+
+from ..arrays import Float64Array, IntArray
+
+Equations = tuple[Float64Array, Float64Array]  # matrices [G, F, F], and right sides [G, F]
 
 FIRST_DAMPING, LESS, MORE = 0.1, 0.3, 5.0  # of a step; after one that helps, after one that does not
 MOST_DAMPED, LEAST_DAMPED = 1e4, 1e-7
@@ -21,11 +26,11 @@ TINY = 1e-9
 class Problem(Protocol):
     """How wrong candidates are, from their rows [G, U]."""
 
-    def errors(self, rows: torch.Tensor) -> torch.Tensor:
+    def errors(self, rows: torch.Tensor) -> Float64Array:
         """Mean squares [G]."""
 
-    def normal(self, rows: torch.Tensor, free: torch.Tensor) -> tuple[torch.Tensor, torch.Tensor]:
-        """The normal equations by the free numbers: the matrices [G, F, F], and the right sides [G, F]."""
+    def normal(self, rows: torch.Tensor, free: IntArray) -> Equations:
+        """The normal equations by the free numbers."""
 
 
 class Dense(NamedTuple):
@@ -34,14 +39,14 @@ class Dense(NamedTuple):
     wrong: Callable[[torch.Tensor], torch.Tensor]
     points: int
 
-    def errors(self, rows: torch.Tensor) -> torch.Tensor:
+    def errors(self, rows: torch.Tensor) -> Float64Array:
         """Mean squares [G]."""
-        return self.wrong(rows[..., None]).square().mean(dim=(1, 2))
+        return _array(self.wrong(rows[..., None]).square().mean(dim=(1, 2)))
 
-    def normal(self, rows: torch.Tensor, free: torch.Tensor) -> tuple[torch.Tensor, torch.Tensor]:
+    def normal(self, rows: torch.Tensor, free: IntArray) -> Equations:
         """The normal equations, by autograd."""
-        wrong, slopes = self._slopes(rows, free)
-        return slopes @ slopes.mT, (slopes @ wrong[..., None])[..., 0]
+        wrong, slopes = self._slopes(rows, torch.from_numpy(free))
+        return _array(slopes @ slopes.mT), _array((slopes @ wrong[..., None])[..., 0])
 
     def _slopes(self, rows: torch.Tensor, free: torch.Tensor) -> tuple[torch.Tensor, torch.Tensor]:
         """Residuals [G, C · P] and their derivatives by the free numbers [G, F, C · P]."""
@@ -53,19 +58,32 @@ class Dense(NamedTuple):
         return wrong.detach().flatten(1), torch.stack(channels, dim=2).flatten(2)
 
 
+def _array(tensor: torch.Tensor) -> Float64Array:
+    return tensor.detach().numpy().astype(np.float64)
+
+
 class Numbers(NamedTuple):
     """Which numbers of a row move [F], how far each may in one step [F], and what keeps rows in their range."""
 
-    free: torch.Tensor
-    longest: torch.Tensor
+    free: IntArray
+    longest: Float64Array
     project: Callable[[torch.Tensor], None]
+
+    @classmethod
+    def where(
+        cls, moves: Sequence[bool], longest: torch.Tensor, project: Callable[[torch.Tensor], None]
+    ) -> Numbers:
+        """Those that move, of all numbers of a row."""
+        free = np.flatnonzero(moves).astype(np.int64)
+        return cls(free, _array(longest)[free], project)
 
     def without(self, fixed: torch.Tensor) -> Numbers:
         """Those but the ones that are fixed [U]."""
-        moving = ~fixed[self.free]
+        moving = ~fixed.numpy()[self.free]
         return self._replace(free=self.free[moving], longest=self.longest[moving])
 
 
+@torch.no_grad()
 def descend(
     rows: torch.Tensor, problem: Problem, numbers: Numbers, steps: int, tick: Callable[[float], None]
 ) -> tuple[torch.Tensor, torch.Tensor]:
@@ -75,39 +93,40 @@ def descend(
     is told the least of the errors after every step.
     """
     idle, equations = 0, None
-    damping = rows.new_full((len(rows),), FIRST_DAMPING)
+    damping = np.full(len(rows), FIRST_DAMPING)
     errors = problem.errors(rows)
     for _ in range(steps):
         moved = rows.clone()
         equations = equations or problem.normal(rows, numbers.free)
         step = _step(*equations, damping, numbers.longest)
-        moved[:, numbers.free] -= step.clamp(-numbers.longest, numbers.longest)
+        moved.numpy()[:, numbers.free] -= step.clip(-numbers.longest, numbers.longest)
         numbers.project(moved)
         found = problem.errors(moved)
         better = found < errors
-        idle = 0 if bool((found < errors * (1.0 - HARDLY)).any()) else idle + 1
-        equations = None if bool(better.any()) else equations
-        rows = torch.where(better[:, None], moved, rows)
-        errors = torch.where(better, found, errors)
-        damping = (damping * torch.where(better, LESS, MORE)).clamp(LEAST_DAMPED, MOST_DAMPED)
+        idle = 0 if (found < errors * (1.0 - HARDLY)).any() else idle + 1
+        equations = None if better.any() else equations
+        rows = torch.where(torch.from_numpy(better)[:, None], moved, rows)
+        errors = np.where(better, found, errors)
+        damping = (damping * np.where(better, LESS, MORE)).clip(LEAST_DAMPED, MOST_DAMPED)
         tick(float(errors.min()))
         if idle == PATIENCE:
             break
-    return rows, errors
+    return rows, torch.from_numpy(errors).to(rows.dtype)
 
 
 def _step(
-    normal: torch.Tensor, right: torch.Tensor, damping: torch.Tensor, longest: torch.Tensor
-) -> torch.Tensor:
+    normal: Float64Array, right: Float64Array, damping: Float64Array, longest: Float64Array
+) -> Float64Array:
     """How far the free numbers are too large by the damped normal equations, [G, F].
 
     What a longest step of a number does is damped as if it were at least a share of what one of any other does: else
     a number that does nothing here would be moved far, whatever the damping. No way at all where two numbers do the
     same to within rounding: then the next step is damped more.
     """
-    scale = normal.diagonal(dim1=1, dim2=2)
-    effect = scale * longest.square()
-    scale = torch.maximum(effect, FAINT * effect.amax(1, keepdim=True)) / longest.square()
-    damped = normal + torch.diag_embed(scale * damping[:, None] + TINY)
-    step, failed = torch.linalg.solve_ex(damped, right)
-    return torch.where(failed[:, None] == 0, step, 0.0)
+    scale = normal.diagonal(axis1=1, axis2=2)
+    effect = scale * longest**2
+    scale = np.maximum(effect, FAINT * effect.max(1, keepdims=True)) / longest**2
+    damped = normal.copy()
+    np.einsum("gff->gf", damped)[:] += scale * damping[:, None] + TINY
+    step, failed = torch.linalg.solve_ex(torch.from_numpy(damped), torch.from_numpy(right))
+    return np.where(failed.numpy()[:, None] == 0, step.numpy(), 0.0)

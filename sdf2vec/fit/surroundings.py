@@ -64,7 +64,9 @@ def squared_error(scene: SceneTensors, view: View) -> torch.Tensor:
 def some(scene: SceneTensors, which: Callable[[torch.Tensor], torch.Tensor]) -> SceneTensors:
     """The layers at some places of the draw order."""
     picked = [(group, which(group.order).nonzero()[:, 0]) for group in scene.groups]
-    groups = [group.each(partial(_take, rows)) for group, rows in picked if len(rows)]
+    groups = [
+        group if len(rows) == len(group) else _taken(group, rows) for group, rows in picked if len(rows)
+    ]
     return replace(scene, groups=groups)
 
 
@@ -74,8 +76,8 @@ def layer_at(scene: SceneTensors, order: int) -> Group:
     return layer
 
 
-def _take(rows: torch.Tensor, tensor: torch.Tensor) -> torch.Tensor:
-    return tensor[rows]
+def _taken(group: Group, rows: torch.Tensor) -> Group:
+    return group.each(lambda tensor: tensor.index_select(0, rows))
 
 
 @dataclass(frozen=True)
@@ -157,7 +159,7 @@ class Surroundings:
 
     def error(self, layer: Group) -> float:
         """The weighted mean squared error with a layer in the place of this one."""
-        return float(self.problem(layer.structure).errors(layer.rows()))
+        return float(self.problem(layer.structure).errors(layer.rows())[0])
 
     def shown(self) -> torch.Tensor:
         """The picture [C, P] as this place should show it: without what lies above, where that lets enough through."""
