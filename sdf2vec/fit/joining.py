@@ -192,7 +192,7 @@ class Search:
 
     def worth(self, around: Surroundings, price: float) -> Worth:
         """How good layers are in these surroundings."""
-        bare = float(around.residual().square().mean())
+        bare = float(around.residual.square().mean())
         least = max(LEAST_SHARE * bare, LEAST_ERROR)
         return Worth(around.scene.layer_count, least, price, self.falloff[0])
 
@@ -264,7 +264,7 @@ class Search:
 
     def _color(self, around: Surroundings) -> torch.Tensor:
         """The mean colour [1, 3] of what a layer should show."""
-        residual = around.residual()
+        residual = around.residual
         amount = residual.square().sum(0).sqrt()
         wanted = residual if self.layers.signed else around.target
         return straight((wanted * amount).sum(dim=(1, 2))[None] / amount.sum().clamp_min(1e-6))[:, :3]

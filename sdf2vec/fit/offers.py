@@ -231,7 +231,7 @@ def _found(
 
 def _missing(around: Mapping[int, Surroundings]) -> float:
     """The mean squared error of the scene."""
-    return max(float(place.residual().square().mean()) for place in around.values())
+    return max(float(place.residual.square().mean()) for place in around.values())
 
 
 def _best(tries: Sequence[Offer], floor: float) -> Offer:
@@ -269,22 +269,19 @@ def _offers_of(
 ) -> list[Offer | None]:
     """What layers with these rows [N, U] gain; None for those that cover nothing of their region."""
     structure = like.structure
-    before = around.residual().square().mean(0).flatten()
+    before = around.residual.square().mean(0).flatten()
     covers, wrong = around.laid(structure, rows)
     after = wrong.square().mean(1)
-    made: list[Offer | None] = []
-    for row, region, cover, rest in zip(rows, regions, covers, after, strict=True):
-        part = region.under(cover)
-        if not part:
-            made.append(None)
-            continue
-        gain, inside = float((before - rest).mean()), region.labels == part
-        potential = float((before * inside).mean())
-        stays, harm = float((rest * inside).mean()), float(((rest - before).clamp_min(0.0) * ~inside).mean())
-        layer = layer_of(structure, like.order, row[None])
-        shares = (share / max(potential, 1e-12) for share in (stays, harm))
-        made.append(Offer(layer, region, part, cover, gain, potential, *shares))
-    return made
+    parts = torch.tensor([region.under(cover) for region, cover in zip(regions, covers, strict=True)])
+    inside = torch.stack([region.labels for region in regions]) == parts[:, None]
+    potential, gain = (before * inside).mean(1), (before - after).mean(1)
+    stays, harm = (after * inside).mean(1), ((after - before).clamp_min(0.0) * ~inside).mean(1)
+    shares = torch.stack([stays, harm]) / potential.clamp_min(1e-12)
+    numbers = zip(*(each.tolist() for each in (parts, gain, potential, *shares)), strict=True)
+    return [
+        Offer(layer_of(structure, like.order, row[None]), region, part, cover, *rest) if part else None
+        for row, region, cover, (part, *rest) in zip(rows, regions, covers, numbers, strict=True)
+    ]
 
 
 def _tries(found: Sequence[Offer]) -> list[list[Offer]]:
@@ -379,7 +376,7 @@ def _likeness(one: torch.Tensor, other: torch.Tensor) -> float:
 
 def missing_colors(around: Surroundings) -> list[torch.Tensor]:
     """The straight colours [1, 3] of the picture where most is missing, the worst first."""
-    wrong = around.residual().square().sum(0).flatten()
+    wrong = around.residual.square().sum(0).flatten()
     colors = straight(around.shown().T)
     if len(around.target) == 4:
         wrong = wrong * (colors[:, 3] > 0.5)

@@ -29,7 +29,7 @@ def gain_of_one_more(scene: Scene, view: View, search: Search) -> float:
         return 0.0
     layer = _layer(discs, tensors, view, search)
     around = Surroundings.of(tensors, tensors.layer_count, view)
-    before = float(around.residual().square().mean())
+    before = float(around.residual.square().mean())
     after = search.trained(layer, around, STEPS, lambda slot: True).error
     return max(0.0, 10.0 * math.log10(before / max(after, 1e-12))) if before > 0 else 0.0
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import operator
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from functools import partial
+from functools import cached_property, partial
 from typing import NamedTuple
 
 import torch
@@ -167,8 +167,8 @@ class Surroundings:
         below = (target - self.dark) / through.clamp_min(SEEN)
         return torch.where(through > SEEN, below.clamp(0.0, 1.0), target)
 
+    @cached_property
     def residual(self) -> torch.Tensor:
         """What is missing without the layer, weighted, [C, H, W]."""
-        nowhere = torch.zeros_like(self.points[0])[None]
-        wrong = self.wrong_with(nowhere, torch.zeros(1, 3, 1), torch.ones(1, 1))[0]
-        return -wrong.reshape(self.target.shape)
+        seen = self.dark + (self.light - self.dark) * self.below
+        return ((self.target.flatten(1) - seen) * self.weights).reshape(self.target.shape)
