@@ -15,6 +15,7 @@ from .surroundings import error_of, points_of
 
 FLOOR = 10**-4.4  # mean squared error, 44 dB: below it nothing is missing
 NEEDLESS = 1.05  # how much the error may rise by a layer taken out, after a descent
+NEARLY = 1.1  # times that, where a descent of each layer may help
 LITTLE = 0.25  # at most, by this share of what a layer explains in the mean
 
 
@@ -61,19 +62,24 @@ def _bare(
     for order in areas.argsort(descending=True).tolist():
         smaller = (beside[order] & (areas < areas[order])).nonzero()[:, 0].tolist()
         if len(smaller) > 1:
-            fewer, error = _settled(without_all(scene, smaller), sizes, search, hope)
+            fewer, error = _settled(without_all(scene, smaller), sizes, search, worst, hope)
             if error <= worst:
                 return fewer, error
     return None
 
 
-def _settled(scene: SceneTensors, sizes: Sizes, search: Search, hope: Hope) -> tuple[SceneTensors, float]:
-    """The scene after a descent from softer edges, and its error."""
-    scene = softened(scene, hope.softness, sizes.joint)
-    if scene.layer_count <= FEW // 2:
-        scene = each_improved(scene, sizes.search, search)
-    scene = descended(scene, sizes.joint, search, AFTER)
-    return scene, error_of(scene, sizes.joint)
+def _settled(
+    scene: SceneTensors, sizes: Sizes, search: Search, worst: float, hope: Hope
+) -> tuple[SceneTensors, float]:
+    """The scene after a descent from softer edges, and its error; where that is nearly low enough, after one of each
+    layer, too.
+    """
+    scene = descended(softened(scene, hope.softness, sizes.joint), sizes.joint, search, AFTER)
+    error = error_of(scene, sizes.joint)
+    if worst < error <= NEARLY * worst and scene.layer_count <= FEW // 2:
+        scene = descended(each_improved(scene, sizes.search, search), sizes.joint, search, AFTER)
+        error = error_of(scene, sizes.joint)
+    return scene, error
 
 
 def _fewer(
@@ -86,7 +92,7 @@ def _fewer(
     hopeful = [pair for pair in least if pair[0] <= hope.rise * worst]
     for error, fewer in sorted(hopeful, key=lambda pair: count_numbers(pair[1])):
         if error > worst and fewer.layer_count:
-            fewer, error = _settled(fewer, sizes, search, hope)
+            fewer, error = _settled(fewer, sizes, search, worst, hope)
         if error <= worst:
             return fewer, error
     return None
