@@ -305,7 +305,7 @@ class Proposer:
         best = []
         for mask, placed in zip(masks, starts, strict=True):
             fresh = _rows(structure, placed)
-            missed = _misses(structure, [mask] * len(fresh), around, BLURS[0]).errors(fresh)
+            missed = _misses(structure, [mask], around, BLURS[0]).errors(fresh)
             best.append(fresh[_distinct(torch.from_numpy(missed))[:kept]])
         counts = [len(rows) for rows in best]
         spread = [mask for mask, count in zip(masks, counts, strict=True) for _ in range(count)]
