@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import replace
 from typing import NamedTuple
 
@@ -16,24 +15,23 @@ from .surroundings import error_of, points_of
 
 FLOOR = 10**-4.4  # mean squared error, 44 dB: below it nothing is missing
 NEEDLESS = 1.05  # how much the error may rise by a layer taken out, after a descent
+NEARLY = 1.2  # times that, after a descent of all, where one of each layer may help
 LITTLE = 0.25  # at most, by this share of what a layer explains in the mean
 
 
 class Hope(NamedTuple):
     """Which layers may turn out to be needless: so many of those that matter least, without which the error rises at
-    most so many times before a descent; of each layer, too, where it is not more than so many times too high after one
-    of all. The others begin that so soft or softer, in pixels of the picture where all descend: what is sharp stays
-    sharp.
+    most so many times before a descent. The others begin that so soft or softer, in pixels of the picture where all
+    descend: what is sharp stays sharp.
     """
 
     tried: int
     rise: float
-    after: float
     softness: float = 0.0
 
 
-USUAL = Hope(2, 6.0, 1.2)
-THOROUGH = Hope(6, 1000.0, math.inf, 8.0)  # at the end: of two that do the work of one, either matters
+USUAL = Hope(2, 6.0)
+THOROUGH = Hope(6, 1000.0, 8.0)  # at the end: of two that do the work of one, either matters
 
 
 def pruned(
@@ -73,12 +71,16 @@ def _bare(
 def _settled(
     scene: SceneTensors, sizes: Sizes, search: Search, worst: float, hope: Hope
 ) -> tuple[SceneTensors, float]:
-    """The scene after a descent from softer edges, and its error; where that is nearly low enough, after one of each
-    layer, too.
+    """The scene after a descent, and its error. Where layers are few each descends alone, too: those that begin softer
+    first, others where all together came near enough.
     """
-    scene = descended(softened(scene, hope.softness, sizes.joint), sizes.joint, search, AFTER)
+    few = scene.layer_count <= FEW // 2
+    if hope.softness:
+        scene = softened(scene, hope.softness, sizes.joint)
+        scene = each_improved(scene, sizes.search, search) if few else scene
+    scene = descended(scene, sizes.joint, search, AFTER)
     error = error_of(scene, sizes.joint)
-    if worst < error <= hope.after * worst and scene.layer_count <= FEW // 2:
+    if few and not hope.softness and worst < error <= NEARLY * worst:
         scene = descended(each_improved(scene, sizes.search, search), sizes.joint, search, AFTER)
         error = error_of(scene, sizes.joint)
     return scene, error
