@@ -36,7 +36,7 @@ from .matching_pursuit import Painted, find_discs
 from .mending import SLIGHTLY, exchanged
 from .offers import common_color
 from .one_more import gain_of_one_more
-from .pruning import FLOOR, THOROUGH, USUAL, pruned
+from .pruning import BRIEF, FLOOR, THOROUGH, USUAL, pruned
 from .ramps import KIND, grounded
 from .repainting import ground_shade, repainted
 from .settings import AUTO, Settings, preset_of
@@ -353,7 +353,7 @@ class Drawing:
     def _briefer(self, worst: float) -> SceneTensors:
         """The scene without what is needless now that all is simple, where it is told as shortly."""
         sizes, search = self.sizes, self.search
-        fewer = pruned(self.scene, sizes._replace(joint=sizes.last), search, worst)
+        fewer = pruned(self.scene, sizes._replace(joint=sizes.last), search, worst, BRIEF)
         if fewer.layer_count == self.scene.layer_count:
             return self.scene
         fewer = finished(fewer, sizes, search)

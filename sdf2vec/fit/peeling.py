@@ -10,7 +10,6 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
-from functools import cached_property
 
 import numpy as np
 import torch
@@ -22,7 +21,6 @@ from ..blend import SUBTRACTION
 from ..layer import LOOK, Slot, Structure, row_width
 from ..render.reference import rows_coverage
 from ..render.tensors import Group, SceneTensors
-from ..units import Placed
 from .candidates import Mask, Opening, Proposer, own_cover
 from .initialization import straight
 from .joining import Search, inserted
@@ -148,7 +146,7 @@ class Area:
         ends = torch.stack([x[0], y[0], pixel])
         return tuple(tensor.numpy().tobytes() for tensor in (self.inside, self.known, ends))
 
-    @cached_property
+    @property
     def edge(self) -> float:
         """The length of its outline in pixels, where it is known."""
         inside, known = (
@@ -158,16 +156,9 @@ class Area:
 
     def outlined(self, layer: Group) -> Outlined:
         """How well a layer covers it."""
-        return self.all_outlined([layer])[0]
-
-    def all_outlined(self, layers: Sequence[Group]) -> list[Outlined]:
-        """The same of some layers of one structure."""
-        wrong = (self._covers(layers) * self.known - self.inside).abs().sum(1)
-        size = max(float(self.inside.sum()), TINY)
-        return [
-            Outlined(layer, self.overlay, off / self.edge, off / size, self._is_bitten(layer), self.soft)
-            for layer, off in zip(layers, wrong.tolist(), strict=True)
-        ]
+        wrong = float((self.cover(layer) * self.known - self.inside).abs().sum())
+        missed = wrong / max(float(self.inside.sum()), TINY)
+        return Outlined(layer, self.overlay, wrong / self.edge, missed, self._is_bitten(layer), self.soft)
 
     def gross(self, layer: Group, pixels: int) -> float:
         """The share of it that a layer covers wrongly in squares of so many pixels: elsewhere its edge is off."""
@@ -184,12 +175,9 @@ class Area:
 
     def cover(self, layer: Group) -> torch.Tensor:
         """Coverage [P] of a layer without its opacity."""
-        return self._covers([layer])[0]
-
-    def _covers(self, layers: Sequence[Group]) -> torch.Tensor:
-        """The same [G, P] of layers of one structure."""
-        rows, compositing = torch.cat([layer.rows() for layer in layers]), self.around.scene.compositing
-        return rows_coverage(layers[0].structure, rows[..., None], compositing, *self.around.points)[0]
+        rows = layer.rows()[..., None]
+        compositing = self.around.scene.compositing
+        return rows_coverage(layer.structure, rows, compositing, *self.around.points)[0][0]
 
     def hull(self) -> torch.Tensor:
         """Where it may be if it is convex: others may hide parts of it, [P]."""
@@ -366,11 +354,8 @@ def _outlined(area: Area, fine: Area, search: Search) -> Outlined | None:
     """The best that shapes of all kinds come to, of those that are good what is so in the finest surroundings, too;
     None where there is less than a pixel.
     """
-    if area.inside.max() <= 0.5:
-        return None
     proposer = search.proposer(area.around)
-    starts = [proposer.placed(wanted, area.around) for wanted in (area.inside, area.hull())]
-    plain = _single(area, area.opening(), proposer, starts)
+    plain = _single(area, area.opening(), proposer) if area.inside.max() > 0.5 else []
     if not plain:
         return None
     ranked = _sharpest(plain, area, proposer)
@@ -380,8 +365,7 @@ def _outlined(area: Area, fine: Area, search: Search) -> Outlined | None:
         exact = [proposer.sharpened(each.layer, mask, fine.around, STEPS) for each in good]
         return area.outlined(min(exact, key=lambda layer: fine.outlined(layer).priced(FINELY_OFF, DEAR)))
     best = ranked[0]
-    wide = _single(area, area.opening(EAGER), proposer, starts)
-    wide.sort(key=lambda each: _eager(each, area))
+    wide = sorted(_single(area, area.opening(EAGER), proposer), key=lambda each: _eager(each, area))
     cut = [
         area.outlined(tried.layer)
         for base in _distinct(wide)[:BASES]
@@ -410,11 +394,12 @@ def _sharpest(tried: Sequence[Outlined], area: Area, proposer: Proposer) -> list
     return sorted([*tried, *sharp], key=lambda each: each.score)
 
 
-def _single(area: Area, opening: Opening, proposer: Proposer, starts: Sequence[Placed]) -> list[Outlined]:
+def _single(area: Area, opening: Opening, proposer: Proposer) -> list[Outlined]:
     """All that shapes of every kind come to in an opening for an area."""
+    starts = [proposer.placed(wanted, area.around) for wanted in (area.inside, area.hull())]
     places = [opening] * len(starts)
     ends = (proposer.optima(kind, places, starts, area.around, STARTS) for kind in proposer.kinds)
-    return [each for found in ends if found for each in area.all_outlined([layer for _, layer in found])]
+    return [area.outlined(layer) for found in ends for _, layer in found]
 
 
 def _eager(tried: Outlined, area: Area) -> float:

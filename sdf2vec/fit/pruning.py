@@ -8,10 +8,11 @@ from typing import NamedTuple
 from ..render.reference import layers_at
 from ..render.tensors import SceneTensors
 from .descents import AFTER, FEW, Sizes, descended, each_improved, softened
-from .draw_order import touching, without, without_all
+from .description import description_length
+from .draw_order import reordered, touching, without, without_all
 from .joining import Search
 from .least_squares import count_numbers
-from .surroundings import error_of, points_of
+from .surroundings import View, error_of, points_of
 
 FLOOR = 10**-4.4  # mean squared error, 44 dB: below it nothing is missing
 NEEDLESS = 1.05  # how much the error may rise by a layer taken out, after a descent
@@ -22,15 +23,17 @@ LITTLE = 0.25  # at most, by this share of what a layer explains in the mean
 class Hope(NamedTuple):
     """Which layers may turn out to be needless: so many of those that matter least, without which the error rises at
     most so many times before a descent. The others begin that so soft or softer, in pixels of the picture where all
-    descend: what is sharp stays sharp.
+    descend: what is sharp stays sharp. Where it is to be `brief` the picture must be told as shortly without the layer.
     """
 
     tried: int
     rise: float
     softness: float = 0.0
+    brief: bool = False
 
 
 USUAL = Hope(2, 6.0)
+BRIEF = Hope(4, 6.0, brief=True)
 THOROUGH = Hope(6, 1000.0, 8.0)  # at the end: of two that do the work of one, either matters
 
 
@@ -71,19 +74,21 @@ def _bare(
 def _settled(
     scene: SceneTensors, sizes: Sizes, search: Search, worst: float, hope: Hope
 ) -> tuple[SceneTensors, float]:
-    """The scene after a descent, and its error. Where layers are few each descends alone, too: those that begin softer
-    first, others where all together came near enough.
+    """The scene after a descent, and its error. Where layers are few each is first put where it serves best in the draw
+    order: one may be there twice, once below what it lies on. Where the error is too high then each of them descends,
+    too: from softer edges, or where not much is missing.
     """
     few = scene.layer_count <= FEW // 2
+    scene = reordered(scene, sizes.joint) if few else scene
+    made = descended(scene, sizes.joint, search, AFTER)
+    error = error_of(made, sizes.joint)
+    if error <= worst or not (hope.softness or (few and error <= NEARLY * worst)):
+        return made, error
     if hope.softness:
-        scene = softened(scene, hope.softness, sizes.joint)
-        scene = each_improved(scene, sizes.search, search) if few else scene
-    scene = descended(scene, sizes.joint, search, AFTER)
-    error = error_of(scene, sizes.joint)
-    if few and not hope.softness and worst < error <= NEARLY * worst:
-        scene = descended(each_improved(scene, sizes.search, search), sizes.joint, search, AFTER)
-        error = error_of(scene, sizes.joint)
-    return scene, error
+        made = softened(scene, hope.softness, sizes.joint)
+    made = each_improved(made, sizes.search, search) if few else made
+    made = descended(made, sizes.joint, search, AFTER)
+    return made, error_of(made, sizes.joint)
 
 
 def _fewer(
@@ -97,6 +102,11 @@ def _fewer(
     for error, fewer in sorted(hopeful, key=lambda pair: count_numbers(pair[1])):
         if error > worst and fewer.layer_count:
             fewer, error = _settled(fewer, sizes, search, worst, hope)
-        if error <= worst:
+        if error <= worst and not (hope.brief and _is_longer(fewer, scene, sizes.joint)):
             return fewer, error
     return None
+
+
+def _is_longer(scene: SceneTensors, other: SceneTensors, view: View) -> bool:
+    """Whether it takes more to tell a picture by a scene than by another."""
+    return description_length(scene, view) > description_length(other, view)
