@@ -33,7 +33,7 @@ from .initialization import FAINTEST_GROUND, Layers, background_of, empty_groups
 from .joining import Search
 from .loop import Callback, Progress, Stopped
 from .matching_pursuit import Painted, find_discs
-from .mending import SLIGHTLY, exchanged
+from .mending import SLIGHTLY, exchanged, merged
 from .offers import common_color
 from .one_more import gain_of_one_more
 from .pruning import BRIEF, FLOOR, THOROUGH, USUAL, pruned
@@ -338,6 +338,7 @@ class Drawing:
     def _finish(self) -> None:
         worst = 0.0 if self.settings.target_psnr is None else self.floor
         sizes, search = self.sizes, self.search
+        self.scene = merged(self.scene, sizes, search, worst or FLOOR)
         self.scene = softer(self.scene, sizes.joint, search)
         if error_of(self.scene, sizes.joint) > worst:
             self.scene = exchanged(self.scene, sizes, search, SLIGHTLY)

@@ -1,13 +1,16 @@
-"""Layers of a scene thought of again, now that others are there: found anew, exchanged, cut."""
+"""Layers of a scene thought of again, now that others are there: found anew, exchanged, merged, cut."""
 
 from __future__ import annotations
+
+from functools import partial
 
 import torch
 
 from ..paints import BASE
 from ..render.tensors import SceneTensors
 from .candidates import Opening, cut_from, in_place_of
-from .descents import AFTER, FEW, Sizes, descended
+from .descents import AFTER, FEW, JOINT, Sizes, descended, softened
+from .description import description_length
 from .draw_order import MOVED, opened, without_all
 from .joining import Search, faults_of, inserted
 from .offers import NEAR, instead_of
@@ -22,6 +25,10 @@ WORST, SLIGHTLY = (
 )  # of all that is wrong, where a layer is whose shapes are exchanged; that is found anew
 TRIES = 12  # layers that are found anew in vain, one after the other
 PROMISING = 3.0  # times the error before, of another shape in the place of one, the others as they were
+RISE, SOFTER = (
+    8.0,
+    4.0,
+)  # times the error before, at most, of one shape in the place of several; pixels, of edges from which all descend
 RETHOUGHT = 2  # colours whose layers are found anew in a round, at most
 
 
@@ -46,6 +53,35 @@ def replaced(scene: SceneTensors, sizes: Sizes, search: Search, floor: float) ->
         if made is not None and (now := error_of(made, sizes.joint)) < MOVED * error:
             scene, error, worst = made, now, _faulty(made, sizes.joint, SLIGHTLY)[:TRIES]
     return pruned(scene, sizes, search, floor)
+
+
+def merged(scene: SceneTensors, sizes: Sizes, search: Search, worst: float) -> SceneTensors:
+    """The scene with one shape in the place of several of a colour, which did the work of one that was not found, such
+    as a soft disc: as long as no more is wrong than the worst, or the picture is told more shortly.
+    """
+    for orders in _alike(scene, sizes.search) if scene.layer_count <= FEW else ():
+        made = _in_one(scene, orders, sizes, search, worst) if len(orders) > 1 else None
+        if made is not None:
+            return merged(made, sizes, search, worst)
+    return scene
+
+
+def _in_one(
+    scene: SceneTensors, orders: list[int], sizes: Sizes, search: Search, worst: float
+) -> SceneTensors | None:
+    """The scene with one layer in the place of some, without what made up for them; None where that is no better."""
+    made = _anew(scene, orders, sizes, search, worst)
+    error = partial(error_of, view=sizes.joint)
+    if made is None or error(made) > RISE * max(error(scene), worst):
+        return None
+    softer = softened(made, SOFTER, sizes.joint)
+    made = min((descended(each, sizes.joint, search, JOINT) for each in (made, softer)), key=error)
+    made = pruned(made, sizes, search, NEEDLESS * error(made))
+    made = descended(made, sizes.joint, search, JOINT)
+    if error(made) <= worst:
+        return made
+    lengths = [description_length(each, sizes.last) for each in (made, scene)]
+    return made if lengths[0] < lengths[1] else None
 
 
 def _anew(

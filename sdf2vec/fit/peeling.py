@@ -10,6 +10,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 
 import numpy as np
 import torch
@@ -146,7 +147,7 @@ class Area:
         ends = torch.stack([x[0], y[0], pixel])
         return tuple(tensor.numpy().tobytes() for tensor in (self.inside, self.known, ends))
 
-    @property
+    @cached_property
     def edge(self) -> float:
         """The length of its outline in pixels, where it is known."""
         inside, known = (
@@ -156,9 +157,16 @@ class Area:
 
     def outlined(self, layer: Group) -> Outlined:
         """How well a layer covers it."""
-        wrong = float((self.cover(layer) * self.known - self.inside).abs().sum())
-        missed = wrong / max(float(self.inside.sum()), TINY)
-        return Outlined(layer, self.overlay, wrong / self.edge, missed, self._is_bitten(layer), self.soft)
+        return self.all_outlined([layer])[0]
+
+    def all_outlined(self, layers: Sequence[Group]) -> list[Outlined]:
+        """The same of some layers of one structure."""
+        wrong = (self._covers(layers) * self.known - self.inside).abs().sum(1)
+        size = max(float(self.inside.sum()), TINY)
+        return [
+            Outlined(layer, self.overlay, off / self.edge, off / size, self._is_bitten(layer), self.soft)
+            for layer, off in zip(layers, wrong.tolist(), strict=True)
+        ]
 
     def gross(self, layer: Group, pixels: int) -> float:
         """The share of it that a layer covers wrongly in squares of so many pixels: elsewhere its edge is off."""
@@ -175,9 +183,12 @@ class Area:
 
     def cover(self, layer: Group) -> torch.Tensor:
         """Coverage [P] of a layer without its opacity."""
-        rows = layer.rows()[..., None]
-        compositing = self.around.scene.compositing
-        return rows_coverage(layer.structure, rows, compositing, *self.around.points)[0][0]
+        return self._covers([layer])[0]
+
+    def _covers(self, layers: Sequence[Group]) -> torch.Tensor:
+        """The same [G, P] of layers of one structure."""
+        rows, compositing = torch.cat([layer.rows() for layer in layers]), self.around.scene.compositing
+        return rows_coverage(layers[0].structure, rows[..., None], compositing, *self.around.points)[0]
 
     def hull(self) -> torch.Tensor:
         """Where it may be if it is convex: others may hide parts of it, [P]."""
@@ -399,7 +410,7 @@ def _single(area: Area, opening: Opening, proposer: Proposer) -> list[Outlined]:
     starts = [proposer.placed(wanted, area.around) for wanted in (area.inside, area.hull())]
     places = [opening] * len(starts)
     ends = (proposer.optima(kind, places, starts, area.around, STARTS) for kind in proposer.kinds)
-    return [area.outlined(layer) for found in ends for _, layer in found]
+    return [each for found in ends if found for each in area.all_outlined([layer for _, layer in found])]
 
 
 def _eager(tried: Outlined, area: Area) -> float:
