@@ -239,6 +239,13 @@ def add_choices(parser: argparse.ArgumentParser) -> None:
         "--pictures", type=Path, metavar="FOLDER", help="write the pictures there, fit nothing"
     )
     choices.add_count(parser, "--seeds", SEEDS, "how many seeds")
+    parser.add_argument(
+        "--first-seed",
+        type=choices.reader(choices.whole_number(0)),
+        default=0,
+        metavar="N",
+        help="of so many: others are other scenes, which nothing was tuned on (default: 0)",
+    )
     numbers = choices.reader(choices.several(choices.whole_number(0)))
     choices.add_list(parser, "--counts", numbers, ",".join(map(str, COUNTS)), "how many shapes there are")
     choices.add_list(parser, "--modes", choices.names("mode", MODES), ",".join(MODES), "how shapes lie")
@@ -249,7 +256,7 @@ def pages(options: argparse.Namespace, asked: Asked) -> Iterator[Page]:
     """A page after every seed: it takes long. None where only the pictures are wanted. Raises Sdf2vecError."""
     tools = _tools_of(options)
     found: dict[str, list[Result]] = {tool: [] for tool in tools}
-    for seed in range(options.seeds):
+    for seed in range(options.first_seed, options.first_seed + options.seeds):
         cases = [Case(mode, true, seed) for mode, true in product(options.modes, options.counts)]
         if options.pictures:
             for case in cases:
