@@ -1,5 +1,8 @@
 """Layers thought of again: from scenes with mistakes in them, on pictures drawn in numpy."""
 
+from dataclasses import replace
+
+import numpy as np
 import pytest
 
 from sdf2vec.fit import mending
@@ -8,19 +11,9 @@ from sdf2vec.fit.surroundings import error_of
 from sdf2vec.render.tensors import from_scene, to_scene
 from sdf2vec.scene import Layer, Scene, Shape
 from tests.fit.drawn import BLUE, GREEN, RED, SIDE, WHITE, box, disc, painted, search_of, sharp_disc, view_of
+from tests.fit.shaped import rgb, sharp_triangle
 
 FLOOR = 10**-4.4
-
-
-def rgb(color):
-    red, green, blue = map(float, color)
-    return red, green, blue
-
-
-def triangle(color, *corners):
-    """A sharp one by its corners in pixels."""
-    a, b, c = ((x / SIDE - 0.5, y / SIDE - 0.5) for x, y in corners)
-    return Layer((Shape.of("triangle", rgb(color), a=a, b=b, c=c),))
 
 
 def mended(layers, way, pixels, more):
@@ -36,7 +29,7 @@ def test_a_layer_is_found_anew_where_another_hid_what_it_is():
     pixels = painted(
         (box(20, 30, 70, 62), BLUE, 1.0), (disc(70, 30, 14), RED, 1.0), (disc(24, 78, 12), GREEN, 1.0)
     )
-    wrong = triangle(BLUE, (20, 30), (70, 62), (20, 62))
+    wrong = sharp_triangle(BLUE, (20, 30), (70, 62), (20, 62))
     layers = wrong, sharp_disc(RED, 70, 30, 14), sharp_disc(GREEN, 24, 78, 12)
     found, before, after = mended(layers, mending.replaced, pixels, FLOOR)
     assert (len(found), found[0].shapes[0].kind) == (3, "box")
@@ -66,3 +59,25 @@ def test_shapes_are_exchanged_where_little_is_wrong_too():
     assert kept[1].shapes[0].kind == "box"
     assert found[1].shapes[0].kind in ("circle", "ellipse")
     assert after < 0.05 * before
+
+
+def test_several_layers_that_make_up_a_soft_disc_become_it():
+    """Two discs and a triangle, all of its colour."""
+    x, y = np.meshgrid(*(np.arange(SIDE) + 0.5,) * 2)
+    soft = 1 / (1 + np.exp((np.hypot(x - 44, y - 50) - 20) / 0.8))
+    pixels = WHITE + soft[..., None] * (BLUE - WHITE)
+    parts = sharp_disc(BLUE, 44, 50, 17), sharp_disc(BLUE, 44, 50, 19)
+    corner = sharp_triangle(BLUE, (30, 62), (44, 74), (36, 70))
+    layers = tuple(replace(part, falloff=0.02) for part in (*parts, corner))
+    found, before, after = mended(layers, mending.merged, pixels, FLOOR)
+    assert len(found) == 1
+    assert after < FLOOR < before
+
+
+@pytest.mark.parametrize("rise", [mending.RISE, 1e9])
+def test_discs_of_one_colour_in_two_places_stay_two(rise, monkeypatch):
+    monkeypatch.setattr(mending, "RISE", rise)
+    pixels = painted((disc(30, 40, 16), BLUE, 1.0), (disc(68, 56, 14), BLUE, 1.0))
+    layers = sharp_disc(BLUE, 30, 40, 16), sharp_disc(BLUE, 68, 56, 14)
+    found, *_ = mended(layers, mending.merged, pixels, FLOOR)
+    assert [layer.shapes[0] for layer in found] == [layer.shapes[0] for layer in layers]
