@@ -22,10 +22,9 @@ def test_a_layer_in_its_own_place_is_as_wrong_as_the_scene(compositing, channels
     ground = (0.4, 0.5, 0.6) if channels == 3 or compositing == "additive" else None
     scene = from_scene(Scene(WIDTH, HEIGHT, layers, ground, compositing))
     draw = torch.Generator().manual_seed(order)
-    view = View(
-        torch.rand(channels, HEIGHT, WIDTH, generator=draw), torch.rand(HEIGHT, WIDTH, generator=draw)
-    )
-    wrong = (composite(scene, WIDTH, HEIGHT)[:channels] - view.target) * view.weights
+    target, weights = (torch.rand(*each, HEIGHT, WIDTH, generator=draw) for each in ((channels,), ()))
+    view = View(target, weights)
+    wrong = (composite(scene, WIDTH, HEIGHT)[:channels] - target) * weights
     around, layer = Surroundings.of(scene, order, view), layer_at(scene, order)
     assert around.wrong(layer)[0].numpy() == pytest.approx(wrong.flatten(1).numpy(), abs=2e-5)
     assert around.error(layer) == pytest.approx(float(wrong.square().mean()), rel=1e-4)
