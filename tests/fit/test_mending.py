@@ -81,3 +81,9 @@ def test_discs_of_one_colour_in_two_places_stay_two(rise, monkeypatch):
     layers = sharp_disc(BLUE, 30, 40, 16), sharp_disc(BLUE, 68, 56, 14)
     found, *_ = mended(layers, mending.merged, pixels, FLOOR)
     assert [layer.shapes[0] for layer in found] == [layer.shapes[0] for layer in layers]
+
+
+@pytest.mark.parametrize("layers", [(), (sharp_disc(BLUE, 44, 50),)])
+def test_nothing_is_merged_where_there_are_no_two(layers):
+    found, *_ = mended(layers, mending.merged, painted(), FLOOR)
+    assert len(found) == len(layers)
