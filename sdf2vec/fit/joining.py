@@ -79,6 +79,8 @@ def detached(scene: SceneTensors) -> SceneTensors:
 
 def faults_of(scene: SceneTensors, view: View) -> list[float]:
     """For each layer in draw order, how wrong the picture is where it covers."""
+    if not scene.groups:
+        return []
     covers, _ = layers_at(scene, *points_of(scene, view))
     faults: list[float] = (covers @ _wrong(scene, view)).tolist()
     return faults

@@ -59,7 +59,7 @@ def merged(scene: SceneTensors, sizes: Sizes, search: Search, worst: float) -> S
     """The scene with one shape in the place of several of a colour, which did the work of one that was not found, such
     as a soft disc: as long as no more is wrong than the worst, or the picture is told more shortly.
     """
-    for orders in _alike(scene, sizes.search) if 1 < scene.layer_count <= FEW else ():
+    for orders in _alike(scene, sizes.search) if scene.layer_count <= FEW else ():
         made = _in_one(scene, orders, sizes, search, worst) if len(orders) > 1 else None
         if made is not None:
             return merged(made, sizes, search, worst)

@@ -83,7 +83,11 @@ def test_discs_of_one_colour_in_two_places_stay_two(rise, monkeypatch):
     assert [layer.shapes[0] for layer in found] == [layer.shapes[0] for layer in layers]
 
 
-@pytest.mark.parametrize("layers", [(), (sharp_disc(BLUE, 44, 50),)])
-def test_nothing_is_merged_where_there_are_no_two(layers):
-    found, *_ = mended(layers, mending.merged, painted(), FLOOR)
-    assert len(found) == len(layers)
+@pytest.mark.parametrize("way", [mending.merged, mending.exchanged, mending.replaced])
+def test_nothing_comes_of_no_layers(way):
+    assert mended((), way, painted((disc(30, 40, 16), BLUE, 1.0)), FLOOR)[0] == ()
+
+
+def test_a_layer_alone_is_not_merged():
+    found, *_ = mended((sharp_disc(BLUE, 44, 50),), mending.merged, painted(), FLOOR)
+    assert len(found) == 1
