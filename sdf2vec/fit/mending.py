@@ -57,7 +57,8 @@ def replaced(scene: SceneTensors, sizes: Sizes, search: Search, floor: float) ->
 
 def merged(scene: SceneTensors, sizes: Sizes, search: Search, worst: float) -> SceneTensors:
     """The scene with one shape in the place of several of a colour, which did the work of one that was not found, such
-    as a soft disc: as long as no more is wrong than the worst, or the picture is told more shortly.
+    as a soft disc: as long as no more is wrong than the worst, or, where more is already, the picture is told more
+    shortly.
     """
     for orders in _alike(scene, sizes.search) if scene.layer_count <= FEW else ():
         made = _in_one(scene, orders, sizes, search, worst) if len(orders) > 1 else None
@@ -78,8 +79,8 @@ def _in_one(
     made = min((descended(each, sizes.joint, search, JOINT) for each in (made, softer)), key=error)
     made = pruned(made, sizes, search, NEEDLESS * error(made))
     made = descended(made, sizes.joint, search, JOINT)
-    if error(made) <= worst:
-        return made
+    if error(made) <= worst or error(scene) <= worst:
+        return made if error(made) <= worst else None
     lengths = [description_length(each, sizes.last) for each in (made, scene)]
     return made if lengths[0] < lengths[1] else None
 

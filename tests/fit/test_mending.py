@@ -83,6 +83,14 @@ def test_discs_of_one_colour_in_two_places_stay_two(rise, monkeypatch):
     assert [layer.shapes[0] for layer in found] == [layer.shapes[0] for layer in layers]
 
 
+def test_a_scene_that_is_near_enough_stays_so_however_shortly_another_tells_the_picture(monkeypatch):
+    monkeypatch.setattr(mending, "RISE", 1e9)
+    monkeypatch.setattr(mending, "description_length", lambda scene, view: scene.layer_count)
+    pixels = painted((disc(30, 40, 16), BLUE, 1.0), (disc(68, 56, 14), BLUE, 1.0))
+    layers = sharp_disc(BLUE, 30, 40, 16), sharp_disc(BLUE, 68, 56, 14)
+    assert len(mended(layers, mending.merged, pixels, FLOOR)[0]) == 2
+
+
 @pytest.mark.parametrize("way", [mending.merged, mending.exchanged, mending.replaced])
 def test_nothing_comes_of_no_layers(way):
     assert mended((), way, painted((disc(30, 40, 16), BLUE, 1.0)), FLOOR)[0] == ()
