@@ -26,3 +26,8 @@ def description_length(scene: SceneTensors, view: View) -> float:
     counts = classes.unique(return_counts=True)[1].double()
     entropy = -(counts * (counts / counts.sum()).log2()).sum()
     return BITS * numbers + float(entropy + classes.double().sum())
+
+
+def is_longer(scene: SceneTensors, other: SceneTensors, view: View) -> bool:
+    """Whether it takes more to tell a picture by a scene than by another."""
+    return description_length(scene, view) > description_length(other, view)

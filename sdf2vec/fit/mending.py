@@ -10,7 +10,7 @@ from ..paints import BASE
 from ..render.tensors import SceneTensors
 from .candidates import Opening, cut_from, in_place_of
 from .descents import AFTER, FEW, JOINT, Sizes, descended, softened
-from .description import description_length
+from .description import is_longer
 from .draw_order import MOVED, opened, without_all
 from .joining import Search, faults_of, inserted
 from .offers import NEAR, instead_of
@@ -79,10 +79,9 @@ def _in_one(
     made = min((descended(each, sizes.joint, search, JOINT) for each in (made, softer)), key=error)
     made = pruned(made, sizes, search, NEEDLESS * error(made))
     made = descended(made, sizes.joint, search, JOINT)
-    if error(made) <= worst or error(scene) <= worst:
-        return made if error(made) <= worst else None
-    lengths = [description_length(each, sizes.last) for each in (made, scene)]
-    return made if lengths[0] < lengths[1] else None
+    if error(made) <= worst:
+        return made
+    return made if error(scene) > worst and is_longer(scene, made, sizes.last) else None
 
 
 def _anew(

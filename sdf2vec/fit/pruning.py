@@ -8,11 +8,11 @@ from typing import NamedTuple
 from ..render.reference import layers_at
 from ..render.tensors import SceneTensors
 from .descents import AFTER, FEW, Sizes, descended, each_improved, softened
-from .description import description_length
+from .description import is_longer
 from .draw_order import reordered, touching, without, without_all
 from .joining import Search
 from .least_squares import count_numbers
-from .surroundings import View, error_of, points_of
+from .surroundings import error_of, points_of
 
 FLOOR = 10**-4.4  # mean squared error, 44 dB: below it nothing is missing
 NEEDLESS = 1.05  # how much the error may rise by a layer taken out, after a descent
@@ -102,11 +102,6 @@ def _fewer(
     for error, fewer in sorted(hopeful, key=lambda pair: count_numbers(pair[1])):
         if error > worst and fewer.layer_count:
             fewer, error = _settled(fewer, sizes, search, worst, hope)
-        if error <= worst and not (hope.brief and _is_longer(fewer, scene, sizes.joint)):
+        if error <= worst and not (hope.brief and is_longer(fewer, scene, sizes.joint)):
             return fewer, error
     return None
-
-
-def _is_longer(scene: SceneTensors, other: SceneTensors, view: View) -> bool:
-    """Whether it takes more to tell a picture by a scene than by another."""
-    return description_length(scene, view) > description_length(other, view)

@@ -97,9 +97,9 @@ def _offers(scene: SceneTensors, view: View, search: Search, floor: float) -> li
     """New layers, for the bottom of the scene, its top, or next above the layer where most is wrong; the draw order is
     that of the scene without the others.
     """
-    faults = faults_of(scene, view) if scene.groups else [0.0]
-    above = max(range(len(faults)), key=faults.__getitem__) + 1
-    orders = sorted({lowest(scene), min(above, scene.layer_count), scene.layer_count})
+    faults = faults_of(scene, view)
+    above = max(range(len(faults)), key=faults.__getitem__, default=-1) + 1
+    orders = sorted({lowest(scene), above, scene.layer_count})
     around = {order: Surroundings.of(opened(scene, order), order, view) for order in orders}
     return offers(around, search, floor)
 

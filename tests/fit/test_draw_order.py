@@ -5,8 +5,20 @@ import pytest
 from sdf2vec.fit.draw_order import moved, reordered
 from sdf2vec.render.tensors import from_scene, to_scene
 from sdf2vec.scene import Scene
-from tests.fit.drawn import BLUE, GREEN, RED, SIDE, WHITE, box, disc, painted, sharp_disc, view_of
-from tests.fit.shaped import rgb, sharp_box
+from tests.fit.drawn import (
+    BLUE,
+    GREEN,
+    RED,
+    SIDE,
+    WHITE,
+    box,
+    disc,
+    painted,
+    rgb,
+    sharp_box,
+    sharp_disc,
+    view_of,
+)
 
 FIRST, SECOND, THIRD = sharp_disc(RED, 40, 40), sharp_box(BLUE, 30, 30, 60, 60), sharp_disc(GREEN, 50, 50)
 

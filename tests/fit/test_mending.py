@@ -9,9 +9,23 @@ from sdf2vec.fit import mending
 from sdf2vec.fit.descents import Sizes
 from sdf2vec.fit.surroundings import error_of
 from sdf2vec.render.tensors import from_scene, to_scene
-from sdf2vec.scene import Layer, Scene, Shape
-from tests.fit.drawn import BLUE, GREEN, RED, SIDE, WHITE, box, disc, painted, search_of, sharp_disc, view_of
-from tests.fit.shaped import rgb, sharp_triangle
+from sdf2vec.scene import Scene
+from tests.fit.drawn import (
+    BLUE,
+    GREEN,
+    RED,
+    SIDE,
+    WHITE,
+    box,
+    disc,
+    painted,
+    rgb,
+    search_of,
+    sharp_box,
+    sharp_disc,
+    sharp_triangle,
+    view_of,
+)
 
 FLOOR = 10**-4.4
 
@@ -51,9 +65,7 @@ def test_nothing_is_found_anew_where_nothing_is_missing():
 def test_shapes_are_exchanged_where_little_is_wrong_too():
     """A small box that is a disc: a tenth of what is wrong in a disc that is too large."""
     pixels = painted((disc(40, 40, 30), BLUE, 1.0), (disc(80, 80, 6), RED, 1.0))
-    middle, half = (80 / SIDE - 0.5,) * 2, (5.5 / SIDE,) * 2
-    square = Shape.of("box", rgb(RED), center=middle, half_size=half, angle=0.0, corner_radius=0.0)
-    layers = sharp_disc(BLUE, 40, 40, 33), Layer((square,))
+    layers = sharp_disc(BLUE, 40, 40, 33), sharp_box(RED, 74.5, 74.5, 85.5, 85.5)
     kept, *_ = mended(layers, mending.exchanged, pixels, mending.WORST)
     found, before, after = mended(layers, mending.exchanged, pixels, mending.SLIGHTLY)
     assert kept[1].shapes[0].kind == "box"
@@ -85,7 +97,9 @@ def test_discs_of_one_colour_in_two_places_stay_two(rise, monkeypatch):
 
 def test_a_scene_that_is_near_enough_stays_so_however_shortly_another_tells_the_picture(monkeypatch):
     monkeypatch.setattr(mending, "RISE", 1e9)
-    monkeypatch.setattr(mending, "description_length", lambda scene, view: scene.layer_count)
+    monkeypatch.setattr(
+        mending, "is_longer", lambda scene, other, view: scene.layer_count > other.layer_count
+    )
     pixels = painted((disc(30, 40, 16), BLUE, 1.0), (disc(68, 56, 14), BLUE, 1.0))
     layers = sharp_disc(BLUE, 30, 40, 16), sharp_disc(BLUE, 68, 56, 14)
     assert len(mended(layers, mending.merged, pixels, FLOOR)[0]) == 2

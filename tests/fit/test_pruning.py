@@ -10,18 +10,30 @@ from sdf2vec.fit.pruning import BRIEF, FLOOR, USUAL
 from sdf2vec.fit.surroundings import error_of
 from sdf2vec.render.tensors import from_scene, to_scene
 from sdf2vec.scene import Scene
-from tests.fit.drawn import BLUE, GREEN, RED, SIDE, WHITE, box, disc, painted, search_of, sharp_disc, view_of
-from tests.fit.shaped import rgb, sharp_box
-
-TWICE = disc(50, 40, 18) & box(48, 10, 90, 70)
-LEFT = sharp_disc(RED, 50, 40, 18)
+from tests.fit.drawn import (
+    BLUE,
+    GREEN,
+    RED,
+    SIDE,
+    WHITE,
+    box,
+    disc,
+    painted,
+    rgb,
+    search_of,
+    sharp_box,
+    sharp_disc,
+    view_of,
+)
 
 
 def test_a_disc_that_is_there_twice_is_put_on_top_instead():
     """Below a translucent box on which it lies, and once more, small, where it would be seen through that."""
     pixels = painted((box(48, 10, 90, 70), BLUE, 0.5), (disc(50, 40, 18), RED, 1.0))
     over = replace(sharp_box(BLUE, 48, 10, 90, 70), opacity=0.5)
-    scene = from_scene(Scene(SIDE, SIDE, (LEFT, over, sharp_disc(RED, 57, 40, 11)), rgb(WHITE)))
+    scene = from_scene(
+        Scene(SIDE, SIDE, (sharp_disc(RED, 50, 40, 18), over, sharp_disc(RED, 57, 40, 11)), rgb(WHITE))
+    )
     view = view_of(pixels)
     left = pruning.pruned(scene, Sizes(view, view, view), search_of())
     kinds = [layer.shapes[0].kind for layer in to_scene(left, SIDE, SIDE).layers]
