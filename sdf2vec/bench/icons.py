@@ -177,12 +177,18 @@ def table(icons: list[Icon]) -> Iterator[str]:
     for hand in icons[0].drawings:
         drawings = [icon.drawings[hand] for icon in icons]
         middle = Drawing(*np.median(np.array(drawings), axis=0).tolist())
-        artists = np.array([max(icon.drawings["artist"].numbers, 1) for icon in icons])
-        times = np.median(np.array([drawing.numbers for drawing in drawings]) / artists)
         yield (
-            f"| {hand} | {middle.shapes:g} | {middle.parameters:g} | {middle.numbers:g} | {times:.2f} "
+            f"| {hand} | {middle.shapes:g} | {middle.parameters:g} | {middle.numbers:g} | {_times(icons, hand)} "
             f"| {middle.bytes:g} | {middle.gzipped:g} | {middle.psnr:.1f} | {middle.error:.2f} | {middle.seconds:.1f} |"
         )
+
+
+def _times(icons: list[Icon], hand: str) -> str:
+    """How many times the artist's numbers a hand takes, the median; a dash where the artist's are not known."""
+    if "artist" not in icons[0].drawings:
+        return "–"
+    numbers = [[icon.drawings[each].numbers for each in (hand, "artist")] for icon in icons]
+    return f"{np.median([own / max(artists, 1) for own, artists in numbers]):.2f}"
 
 
 def compared(icons: list[Icon], hand: str = "sdf2vec", other: str = "vtracer") -> str:

@@ -50,7 +50,7 @@ from .views import scaled, view_of
 THOROUGHLY = 12  # layers, at most, which in the end are tried without even where they matter
 SEARCH, JOINT, LAST = 56, 128, 320  # pixels squared
 FEW = 4  # shapes that are placed by trial, of any picture, also where their number is given
-SOME, ROUNDS = 64, 4  # shapes that are, of a drawing, where their number is given; rounds of that search
+SOME, ROUNDS = 256, 4  # shapes that are, of a drawing, where their number is given; rounds of that search
 LEVELS = 3.5 / 255  # by which pixels of one flat colour differ at most
 STEADY = 1.5 / 255  # by which they do of a drawing: photographs have noise
 FLAT = 0.6  # share of pixels next to the same colour, of a drawing in flat colours
@@ -60,6 +60,9 @@ LEFT = 0.15  # this share of its variance,
 LITTLE_LEFT = 0.08  # or this, where it is as rough as photographs are
 SMOOTH = 0.6  # share of pixels that are about the mean of those beside them, of what is smooth
 DISC_RESOLUTION = 48
+# of the error so much, 2 dB less, is left by so many rounds that no longer find much; from so many layers on
+LAST_ROUNDS, SLOW, SEVERAL = 3, 10**-0.2, 16
+GROWN = 1.5  # times the layers that could be told by their outlines, where these are not most of the drawing
 UNLIKELY = 1.5  # of the most shapes: a picture that needs more is no drawing
 SOFT_MOST = 16  # shapes of a soft drawing
 GOOD = 10**-3.5  # mean squared error, 35 dB, of what is surely found
@@ -224,7 +227,8 @@ def _may_be_few(settings: Settings) -> bool:
     plain = settings.compositing == "over" and settings.union == 1 and settings.start is None
     plain = plain and settings.paint == ONE_COLOR and settings.min_area is None
     more = settings.palette or settings.colors or settings.cuts or settings.trials
-    few = settings.shapes == AUTO or settings.shapes <= SOME
+    most = SOME if preset_of(settings).searches else FEW
+    few = settings.shapes == AUTO or settings.shapes <= most
     return plain and few and not more and bool(settings.drawn_kinds) and settings.target_flip is None
 
 
@@ -312,12 +316,16 @@ class Drawing:
             self.scene = grounded(self.scene, self.sizes.joint, self.search)
             if not self.scene.groups:
                 self.scene = taken_apart(self.scene, self.sizes, self.search, self.settings.most)
+            outlined, helped = self.scene.layer_count, []
             rounds = grow(self.scene, self.sizes, self.search, self.settings.most, self.floor)
             for made in islice(rounds, ROUNDS if _is_some(self.settings) else None):
                 if self._is_no_drawing(made):
                     self.gave_up = not self._was_good(made)
                     break
                 self.scene = made.scene
+                helped.append(made)
+                if self._are_slow(helped[-LAST_ROUNDS:], outlined):
+                    break
             if not self.gave_up:
                 self._finish()
         except Stopped:
@@ -367,6 +375,17 @@ class Drawing:
         most = UNLIKELY * self.settings.most if self.flat else SOFT_MOST
         grown = made.scene.layer_count > self.scene.layer_count  # what only became simpler says nothing
         return grown and made.scene.layer_count + needed(made, self.flat, self.floor) > most
+
+    def _are_slow(self, rounds: Sequence[Round], outlined: int) -> bool:
+        """Whether the last rounds helped so little that as many more would not find the drawing, few layers of which
+        could be told by their outlines: it is made of other things.
+        """
+        enough = max(SEVERAL, GROWN * outlined)
+        few = len(rounds) < LAST_ROUNDS or rounds[-1].scene.layer_count < enough
+        if few or self.settings.target_psnr is not None:
+            return False
+        left = rounds[-1].error / rounds[0].before
+        return left > SLOW and rounds[-1].error * left > GOOD
 
     def _was_good(self, made: Round) -> bool:
         """Whether all was found before a round that only begins to follow the steps of a jagged edge."""

@@ -108,7 +108,8 @@ class Start:
 class Preset:
     """A whole fit. `compositing`: the only one that it is for; `falloff`: its range in scene units;
     `least_area`: of a shape, in shares of the canvas; smaller ones are pushed to grow; `sharpens`: whether the
-    phases' resolution grows with the number of shapes.
+    phases' resolution grows with the number of shapes; `searches`: whether those of a drawing are looked for where
+    more than a few are told.
     """
 
     phases: tuple[Phase, ...]
@@ -117,6 +118,7 @@ class Preset:
     falloff: tuple[float, float] = (0.0, SOFTEST)
     least_area: float = 0.0
     sharpens: bool = True
+    searches: bool = True
 
     def resolution(self, phase: Phase, shapes: int) -> float:
         """A phase's resolution for so many shapes: what is drawn with many needs more pixels to tell them apart."""
@@ -154,7 +156,8 @@ PRESETS: dict[str, Preset] = {
             Phase("coarse", 200, 80, relocation=OFTEN, growth=Growth(16, 25)),
             Phase("middle", 120, 144, rate=0.8, end_rate=0.6, relocation=OFTEN),
             Phase("fine", 60, 256, rate=0.6, end_rate=0.03, loss=L1_MSE),
-        )
+        ),
+        searches=False,
     ),
     "balanced": Preset(
         (

@@ -78,6 +78,11 @@ def test_medians_in_the_table():
     assert ours == "| sdf2vec | 1 | 0 | 30 | 2.00 | 100 | 50 | 30.0 | 1.00 | 0.0 |"
 
 
+def test_without_the_artists_own_numbers_are_compared_with_none():
+    *_, ours = icons.table([Icon("", {"sdf2vec": drawing(30)}, np.zeros((2, 2, 3), np.float32))])
+    assert ours == "| sdf2vec | 1 | 0 | 30 | – | 100 | 50 | 30.0 | 1.00 | 0.0 |"
+
+
 def test_which_icons_are_taken(tmp_path):
     """As many as asked for, from the first to the last; all where there are fewer."""
     for index in range(10):

@@ -198,23 +198,28 @@ FIVE_DISCS = WHITE + "".join(
 )
 
 
-@pytest.mark.parametrize("count", [5, 8, 32])
+@pytest.mark.parametrize("count", [5, 8, 80])
 def test_a_drawing_is_searched_for_as_many_shapes_as_told(count, drawn):
     """Triangles on the discs that there are, where more are wanted."""
     picture = drawn(FIVE_DISCS)
-    scene = fit(picture, count, preset="fast")
+    scene = fit(picture, count)
     kinds = kinds_of(scene)
     assert kinds == ["circle"] * 5 + ["triangle"] * (count - 5)
     assert quality(scene, picture).psnr >= 36
 
 
 def test_told_how_many_shapes_only_kinds_that_the_user_allows_are_found(drawn):
-    assert kinds_of(fit(drawn(FIVE_DISCS), 8, kind="box", preset="fast")) == ["box"] * 8
+    assert kinds_of(fit(drawn(FIVE_DISCS), 8, kind="box")) == ["box"] * 8
 
 
 def test_a_painting_is_not_searched_for_as_many_shapes_as_told(monkeypatch):
     monkeypatch.setattr(auto.Drawing, "found", lambda self: pytest.fail("it is no drawing"))
-    assert fit(noise(), 8, preset="fast").shape_count == 8
+    assert fit(noise(), 8).shape_count == 8
+
+
+def test_the_fast_preset_does_not_search_for_as_many_shapes_as_told(drawn, monkeypatch):
+    monkeypatch.setattr(auto.Drawing, "found", lambda self: pytest.fail("it is to be fast"))
+    assert fit(drawn(FIVE_DISCS), 8, preset="fast").shape_count == 8
 
 
 def test_an_enlarged_photograph_is_not_searched_for_as_many_shapes_as_told():
@@ -244,7 +249,7 @@ def test_what_is_found_far_from_a_drawing_is_fitted_from_nothing_too(error, begu
 
     monkeypatch.setattr(auto.Drawing, "found", found)
     monkeypatch.setattr(auto, "fit_concisely", fitted_from)
-    made = fit(picture, 8, preset="fast")
+    made = fit(picture, 8)
     assert starts == begun
     assert len(made.layers) == begun[-1]
 
@@ -445,6 +450,29 @@ def test_a_round_that_only_takes_layers_away_does_not_end_the_search():
     drawing.scene = from_scene(_hidden(13, 0.5))
     assert not drawing._is_no_drawing(Round(from_scene(_hidden(12, 0.5)), 2e-4, 1e-4))
     assert drawing._is_no_drawing(Round(from_scene(_hidden(14, 0.5)), 2e-4, 1e-4))
+
+
+@pytest.mark.parametrize(
+    ("outlined", "gains", "made"),
+    [
+        (6, [3, 0.6, 0.6, 0.6, 0.6], 4),
+        (6, [3, 0.6, 0.6, 3, 3, 3, 3], 7),
+        (6, [9, 0.6, 0.6, 0.6, 0.6], 5),
+        (14, [3, 0.6, 0.6, 0.6, 0.6], 5),
+    ],
+    ids=["slow", "quick again", "nearly there", "most layers outlined"],
+)
+def test_a_search_that_would_not_find_the_drawing_ends(outlined, gains, made, monkeypatch):
+    """From 26 dB on, by so many dB a round; with 18 layers."""
+    errors = [10 ** -(2.6 + sum(gains[:count]) / 10) for count in range(len(gains) + 1)]
+    rounds = iter(
+        [Round(from_scene(_hidden(18, 0.5)), *pair) for pair in zip(errors[1:], errors, strict=False)]
+    )
+    monkeypatch.setattr(auto, "taken_apart", lambda *rest: from_scene(_hidden(outlined, 0.5)))
+    monkeypatch.setattr(auto, "grow", lambda *rest: rounds)
+    monkeypatch.setattr(auto.Drawing, "_finish", lambda self: None)
+    auto.Drawing(noise(), settings_of(), lambda progress: False, flat=True).found()
+    assert len(list(rounds)) == len(gains) - made
 
 
 def _hidden(count, level):
