@@ -12,12 +12,12 @@ from collections.abc import Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
 from functools import partial
-from itertools import islice
 
 import numpy as np
 import torch
 from msgspec import structs
 
+from ..arrays import Float32Array
 from ..image import Picture
 from ..paints import FLAT as ONE_COLOR
 from ..quality import psnr_of
@@ -30,6 +30,7 @@ from .descents import Sizes, finished, softer
 from .description import description_length
 from .digits import concise, fit_concisely
 from .initialization import FAINTEST_GROUND, Layers, background_of, empty_groups
+from .jagged import UNSURE, is_jagged, smoothed
 from .joining import Search
 from .loop import Callback, Progress, Stopped
 from .matching_pursuit import Painted, find_discs
@@ -50,7 +51,7 @@ from .views import scaled, view_of
 THOROUGHLY = 12  # layers, at most, which in the end are tried without even where they matter
 SEARCH, JOINT, LAST = 56, 128, 320  # pixels squared
 FEW = 4  # shapes that are placed by trial, of any picture, also where their number is given
-SOME, ROUNDS = 256, 4  # shapes that are, of a drawing, where their number is given; rounds of that search
+SOME = 256  # shapes that are, of a drawing, where their number is given
 LEVELS = 3.5 / 255  # by which pixels of one flat colour differ at most
 STEADY = 1.5 / 255  # by which they do of a drawing: photographs have noise
 FLAT = 0.6  # share of pixels next to the same colour, of a drawing in flat colours
@@ -153,7 +154,7 @@ def _searched(picture: Picture, settings: Settings, callback: Callback, flat: bo
     if settings.shapes == AUTO:
         if drawing.gave_up:
             return None
-        if drawing.error <= (drawing.floor if settings.target_psnr else GOOD):
+        if drawing.error <= drawing.good:
             return Fitted(found, _counted(found))
         if settings.target_psnr is None:
             enough = _enough(picture, settings, found, drawing.sizes.last, callback)
@@ -162,7 +163,7 @@ def _searched(picture: Picture, settings: Settings, callback: Callback, flat: bo
     if settings.shapes == AUTO:
         made = [meeting(picture, going_on, callback)[0]]
     else:
-        anew = [settings] if _is_some(settings) and found.layers and drawing.error > GOOD else []
+        anew = [settings] if _is_some(settings) and found.layers and drawing.error > drawing.good else []
         made = [fit_concisely(picture, each, callback) for each in (going_on, *anew)]
     if settings.shapes == AUTO or (settings.shapes == found.shape_count and settings.loss is None):
         made.append(found)
@@ -301,13 +302,26 @@ class Drawing:
         self.stopped, self.gave_up, self.error = False, False, math.inf
         pixel = pixel_of(picture)
         self.size = (picture.width * pixel, picture.height * pixel)
-        target = settings.target_psnr
-        self.floor = FLOOR if target is None else 10 ** (-target / 10)
         generator = torch.Generator().manual_seed(settings.seed)
         layers = Layers(settings.drawn_kinds, settings.compositing)
         self.search = Search(layers, preset_of(settings).falloff, generator, self._tick, pixel)
-        self.sizes = Sizes(*(view_of(picture.premultiplied, settings, r) for r in (SEARCH, JOINT, LAST)))
+        pixels, self.worst = self._wanted()
+        self.floor = self.worst if settings.target_psnr is not None else max(FLOOR, self.worst)
+        self.good = self.floor if settings.target_psnr is not None else max(GOOD, self.worst)
+        self.sizes = Sizes(*(view_of(pixels, settings, r) for r in (SEARCH, JOINT, LAST)))
         self.scene = SceneTensors([], ground_of(self.sizes.joint.target), settings.compositing, self.size)
+
+    def _wanted(self) -> tuple[Float32Array, float]:
+        """The pixels that are looked for, without steps at the edges, and the mean squared error that any scene may
+        have: of a target, or what these leave unsure.
+        """
+        pixels = self.picture.premultiplied
+        if self.settings.target_psnr is not None:
+            return pixels, 10 ** (-self.settings.target_psnr / 10)
+        if not is_jagged(pixels):
+            return pixels, 0.0
+        smooth = smoothed(pixels)
+        return smooth, UNSURE * float(np.mean((smooth - pixels) ** 2))
 
     def found(self) -> Scene:
         """The scene, as simple as it may be."""
@@ -318,7 +332,7 @@ class Drawing:
                 self.scene = taken_apart(self.scene, self.sizes, self.search, self.settings.most)
             outlined, helped = self.scene.layer_count, []
             rounds = grow(self.scene, self.sizes, self.search, self.settings.most, self.floor)
-            for made in islice(rounds, ROUNDS if _is_some(self.settings) else None):
+            for made in rounds:
                 if self._is_no_drawing(made):
                     self.gave_up = not self._was_good(made)
                     break
@@ -344,19 +358,18 @@ class Drawing:
         return to_scene(self.scene, self.picture.width, self.picture.height)
 
     def _finish(self) -> None:
-        worst = 0.0 if self.settings.target_psnr is None else self.floor
-        sizes, search = self.sizes, self.search
-        self.scene = merged(self.scene, sizes, search, worst or FLOOR)
+        worst, sizes, search = self.worst, self.sizes, self.search
+        self.scene = merged(self.scene, sizes, search, self.floor)
         self.scene = softer(self.scene, sizes.joint, search)
         if error_of(self.scene, sizes.joint) > worst:
             self.scene = exchanged(self.scene, sizes, search, SLIGHTLY)
         few = self.scene.layer_count <= THOROUGHLY
         if worst or few:
             hope = THOROUGH if few else USUAL
-            self.scene = pruned(self.scene, sizes, search, worst or FLOOR, hope)
+            self.scene = pruned(self.scene, sizes, search, self.floor, hope)
         self.scene = simplified(self.scene, sizes.joint, search, worst)
         self.scene = finished(self.scene, sizes, search)
-        self.scene = self._briefer(worst or FLOOR)
+        self.scene = self._briefer(self.floor)
         self.scene = sharing(self.scene, sizes.last, worst)
 
     def _briefer(self, worst: float) -> SceneTensors:
@@ -385,11 +398,11 @@ class Drawing:
         if few or self.settings.target_psnr is not None:
             return False
         left = rounds[-1].error / rounds[0].before
-        return left > SLOW and rounds[-1].error * left > GOOD
+        return left > SLOW and rounds[-1].error * left > self.good
 
     def _was_good(self, made: Round) -> bool:
         """Whether all was found before a round that only begins to follow the steps of a jagged edge."""
-        return self.settings.target_psnr is None and made.before <= GOOD
+        return self.settings.target_psnr is None and made.before <= self.good
 
     def _announce_compiling(self) -> None:
         kinds = replace(self.scene, groups=empty_groups(self.search.layers))

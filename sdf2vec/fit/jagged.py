@@ -1,0 +1,124 @@
+"""Edges in steps, as they are drawn without antialiasing, made smooth again, so that what is found is the shape that
+was drawn and not its steps.
+
+Where an edge goes on in its direction after a step of one pixel, it ran halfway up that step and through the middle of
+what is straight beside it; pixels take the colour beyond as far as it reaches into them (morphological antialiasing:
+Reshetov 2009). Where an edge turns by more it has a corner, which stays.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..arrays import BoolArray, Float32Array
+
+ALIKE = 3.5 / 255  # by which pixels of one colour differ at most
+# share of the steps between pixels beside which there is no other, where nothing is antialiased
+ISOLATED = 0.95
+STEPPED = 0.5  # share of the corners that are at steps of one pixel, of slopes
+UNSURE = 0.4  # of the squares of what smoothing changes so much is still wrong, at most: the edge's place in pixels
+
+
+def is_jagged(pixels: Float32Array) -> bool:
+    """Whether the edges of a picture [H, W, C] have no colours between those on both sides, and most of their corners
+    are at steps of slopes and curves; not in pixel art, say.
+    """
+    edges = [~_alike(pixels[1:], pixels[:-1]), ~_alike(pixels[:, 1:], pixels[:, :-1])]
+    alone = sum(int(_isolated(each).sum()) for each in (edges[0].T, edges[1]))
+    if alone < ISOLATED * max(sum(int(each.sum()) for each in edges), 1):
+        return False
+    corners = int(((edges[0][:, 1:] ^ edges[0][:, :-1]) & (edges[1][1:] ^ edges[1][:-1])).sum())
+    turned = np.swapaxes(pixels, 0, 1)
+    runs = (_Runs.below(each) for each in (pixels, pixels[::-1], turned, turned[::-1]))
+    return sum(each.steps for each in runs) > STEPPED * corners
+
+
+def smoothed(pixels: Float32Array) -> Float32Array:
+    """A picture [H, W, C] with smooth edges in place of those in steps."""
+    down = _reached(pixels)
+    across = tuple(np.swapaxes(part, 0, 1) for part in _reached(np.swapaxes(pixels, 0, 1)))
+    further = (down[0] >= across[0])[
+        ..., None
+    ]  # an edge at 45° has steps in both directions, which say the same
+    share, color = np.where(further[..., 0], down[0], across[0]), np.where(further, down[1], across[1])
+    return (pixels * (1.0 - share[..., None]) + color).astype(np.float32)
+
+
+def _isolated(steps: BoolArray) -> BoolArray:
+    """Those of the steps along rows [H, W - 1] that have no other before or after them."""
+    padded = np.pad(steps, ((0, 0), (1, 1)))
+    return steps & ~padded[:, :-2] & ~padded[:, 2:]
+
+
+def _reached(pixels: Float32Array) -> tuple[Float32Array, Float32Array]:
+    """The share [H, W] of each pixel that the colours above and below it reach into, and these, times it [H, W, C]."""
+    share, color = np.zeros(pixels.shape[:2], np.float32), np.zeros_like(pixels)
+    for runs, flipped in ((_Runs.below(pixels), False), (_Runs.below(pixels[::-1]), True)):
+        for row, column, part in runs.parts():
+            own, other = (len(pixels) - 1 - row, len(pixels) - 2 - row) if flipped else (row, row + 1)
+            np.add.at(share, (own, column), part)
+            np.add.at(color, (own, column), part[:, None] * pixels[other, column])
+    return share, color
+
+
+@dataclass(frozen=True)
+class _Runs:
+    """Straight stretches of edges below rows of pixels, and at which of their ends the edge goes one pixel up."""
+
+    row: np.ndarray
+    first: np.ndarray
+    length: np.ndarray
+    rises_before: BoolArray
+    rises_after: BoolArray
+
+    @classmethod
+    def below(cls, pixels: Float32Array) -> _Runs:
+        """Those of a picture [H, W, C]."""
+        padded = np.pad(pixels, ((1, 0), (1, 1), (0, 0)), constant_values=np.inf)  # beyond, nothing is alike
+        with np.errstate(invalid="ignore"):
+            beside, under = _alike(padded[:, :-1], padded[:, 1:]), _alike(padded[:-1], padded[1:])
+            edge = ~under[1:] & np.isfinite(padded[1:-1]).all(axis=2)
+            rising = _alike(padded[1:-1, :-1], padded[2:, 1:])  # from a pixel to that below and after it
+            falling = _alike(padded[1:-1, 1:], padded[2:, :-1])
+        goes_on = edge[:, :-1] & edge[:, 1:] & beside[1:-1] & beside[2:]
+        starts = edge & ~np.pad(goes_on, ((0, 0), (1, 0)))
+        ends = edge & ~np.pad(goes_on, ((0, 0), (0, 1)))
+        row, first = np.nonzero(starts)
+        last = np.nonzero(ends)[1]
+        # what is below rises beside the end by one pixel: there above it the edge goes on
+        after = edge[:, :-1] & beside[2:] & falling & beside[:-2] & under[:-1, :-1]
+        before = edge[:, 1:] & beside[2:] & rising & beside[:-2] & under[:-1, 1:]
+        rises_after = np.pad(after, ((0, 0), (0, 1)))[row, last]
+        rises_before = np.pad(before, ((0, 0), (1, 0)))[row, first]
+        return cls(row, first - 1, last - first + 1, rises_before, rises_after)
+
+    @property
+    def steps(self) -> int:
+        """How often an edge goes on in its direction a pixel higher."""
+        return int(self.rises_before.sum() + self.rises_after.sum())
+
+    def parts(self) -> Iterator[tuple[np.ndarray, np.ndarray, Float32Array]]:
+        """Rows, columns and shares of pixels above the edges into which what is below reaches, for both ends."""
+        index = np.repeat(np.arange(len(self.row)), self.length)
+        along = np.arange(len(index)) - np.repeat(np.cumsum(self.length) - self.length, self.length)
+        length = self.length[index]
+        for rises, place in ((self.rises_before, along), (self.rises_after, length - 1 - along)):
+            chosen = rises[index]
+            share = _triangle(place[chosen], length[chosen])
+            yield self.row[index][chosen], (self.first[index] + along)[chosen], share
+
+
+def _alike(one: np.ndarray, other: np.ndarray) -> BoolArray:
+    """Which pixels have one colour."""
+    alike: BoolArray = np.abs(one - other).max(axis=-1) <= ALIKE
+    return alike
+
+
+def _triangle(place: np.ndarray, length: np.ndarray) -> Float32Array:
+    """The area, in pixels from `place` to the next, below a line from half a pixel to nothing in the middle."""
+    begin, end = (np.minimum(2.0 * each / length, 1.0) for each in (place, place + 1))
+    area: Float32Array = (0.25 * length * ((end - begin) - 0.5 * (end**2 - begin**2))).astype(np.float32)
+    return area
