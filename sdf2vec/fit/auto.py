@@ -50,6 +50,7 @@ from .views import scaled, view_of
 
 THOROUGHLY = 12  # layers, at most, which in the end are tried without even where they matter
 SEARCH, JOINT, LAST = 56, 128, 320  # pixels squared
+FINE = 4  # times that size, beyond which the steps of an edge are not seen
 FEW = 4  # shapes that are placed by trial, of any picture, also where their number is given
 SOME = 256  # shapes that are, of a drawing, where their number is given
 LEVELS = 3.5 / 255  # by which pixels of one flat colour differ at most
@@ -318,7 +319,7 @@ class Drawing:
         pixels = self.picture.premultiplied
         if self.settings.target_psnr is not None:
             return pixels, 10 ** (-self.settings.target_psnr / 10)
-        if not is_jagged(pixels):
+        if self.picture.width * self.picture.height > (FINE * LAST) ** 2 or not is_jagged(pixels):
             return pixels, 0.0
         smooth = smoothed(pixels)
         return smooth, UNSURE * float(np.mean((smooth - pixels) ** 2))

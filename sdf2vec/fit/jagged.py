@@ -16,20 +16,15 @@ import numpy as np
 from ..arrays import BoolArray, Float32Array
 
 ALIKE = 3.5 / 255  # by which pixels of one colour differ at most
-# share of the steps between pixels beside which there is no other, where nothing is antialiased
-ISOLATED = 0.95
 STEPPED = 0.5  # share of the corners that are at steps of one pixel, of slopes
 UNSURE = 0.4  # of the squares of what smoothing changes so much is still wrong, at most: the edge's place in pixels
 
 
 def is_jagged(pixels: Float32Array) -> bool:
-    """Whether the edges of a picture [H, W, C] have no colours between those on both sides, and most of their corners
-    are at steps of slopes and curves; not in pixel art, say.
+    """Whether most corners of the edges of a picture [H, W, C] are steps of slopes and curves: where it is antialiased
+    there are pixels between, and pixel art has other corners.
     """
     edges = [~_alike(pixels[1:], pixels[:-1]), ~_alike(pixels[:, 1:], pixels[:, :-1])]
-    alone = sum(int(_isolated(each).sum()) for each in (edges[0].T, edges[1]))
-    if alone < ISOLATED * max(sum(int(each.sum()) for each in edges), 1):
-        return False
     corners = int(((edges[0][:, 1:] ^ edges[0][:, :-1]) & (edges[1][1:] ^ edges[1][:-1])).sum())
     turned = np.swapaxes(pixels, 0, 1)
     runs = (_Runs.below(each) for each in (pixels, pixels[::-1], turned, turned[::-1]))
@@ -40,17 +35,10 @@ def smoothed(pixels: Float32Array) -> Float32Array:
     """A picture [H, W, C] with smooth edges in place of those in steps."""
     down = _reached(pixels)
     across = tuple(np.swapaxes(part, 0, 1) for part in _reached(np.swapaxes(pixels, 0, 1)))
-    further = (down[0] >= across[0])[
-        ..., None
-    ]  # an edge at 45° has steps in both directions, which say the same
-    share, color = np.where(further[..., 0], down[0], across[0]), np.where(further, down[1], across[1])
-    return (pixels * (1.0 - share[..., None]) + color).astype(np.float32)
-
-
-def _isolated(steps: BoolArray) -> BoolArray:
-    """Those of the steps along rows [H, W - 1] that have no other before or after them."""
-    padded = np.pad(steps, ((0, 0), (1, 1)))
-    return steps & ~padded[:, :-2] & ~padded[:, 2:]
+    # an edge at 45° has steps in both directions, which say the same
+    further = down[0] >= across[0]
+    share = np.where(further, down[0], across[0])[..., None]
+    return (pixels * (1.0 - share) + np.where(further[..., None], down[1], across[1])).astype(np.float32)
 
 
 def _reached(pixels: Float32Array) -> tuple[Float32Array, Float32Array]:
