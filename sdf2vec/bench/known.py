@@ -8,6 +8,7 @@ from __future__ import annotations
 import argparse
 import time
 from collections.abc import Callable, Iterator
+from dataclasses import replace
 from itertools import product
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -30,15 +31,17 @@ from .table import Asked, Page
 SEEDS = 20
 KINDS = "circle,ellipse,box,triangle"
 GUTTER = 3  # pixels between pictures of the figure
-EDGES = ("sharp", "soft")
+JAGGED = "jagged"
+EDGES = ("sharp", "soft", JAGGED)
 
 
 class Case(NamedTuple):
-    """One scene, by what it is made from: a soft one for every odd seed."""
+    """One scene, by what it is made from: a soft one for every odd seed, or all sharp and without antialiasing."""
 
     mode: str
     true: int
     seed: int
+    jagged: bool = False
 
     @property
     def name(self) -> str:
@@ -46,11 +49,12 @@ class Case(NamedTuple):
 
     @property
     def edges(self) -> str:
-        return EDGES[self.seed % 2]
+        return JAGGED if self.jagged else EDGES[self.seed % 2]
 
     @property
     def known(self) -> KnownScene:
-        return known_scene(self.true, self.mode, self.edges == "soft", self.seed)
+        known = known_scene(self.true, self.mode, self.edges == "soft", self.seed)
+        return replace(known, jagged=self.jagged)
 
 
 class Result(NamedTuple):
@@ -205,7 +209,8 @@ def page(found: dict[str, list[Result]], asked: Asked) -> Page:
 ABOUT = """Pictures of {side} × {side} pixels, made by code from so many circles, ellipses, boxes and triangles, \
 upright and turned, opaque and translucent, some with a hole. Those of even seeds are sharp and drawn by resvg; \
 in those of odd seeds about half of the shapes have soft edges, and they are drawn by samples in numpy: no \
-renderer of this program has a part in it. `apart`: no two touch; `overlap`: every second lies on others, and at \
+renderer of this program has a part in it. With `--jagged` all are sharp, and drawn by resvg without antialiasing \
+(`crispEdges`). `apart`: no two touch; `overlap`: every second lies on others, and at \
 least 60 % of each is not hidden.
 
 Found / true: shapes found for each one that there is (layers, or elements of an SVG but for a background; of a \
@@ -246,6 +251,9 @@ def add_choices(parser: argparse.ArgumentParser) -> None:
         metavar="N",
         help="of so many: others are other scenes, which nothing was tuned on (default: 0)",
     )
+    parser.add_argument(
+        "--jagged", action="store_true", help="all sharp, and drawn by resvg without antialiasing"
+    )
     numbers = choices.reader(choices.several(choices.whole_number(0)))
     choices.add_list(parser, "--counts", numbers, ",".join(map(str, COUNTS)), "how many shapes there are")
     choices.add_list(parser, "--modes", choices.names("mode", MODES), ",".join(MODES), "how shapes lie")
@@ -257,7 +265,9 @@ def pages(options: argparse.Namespace, asked: Asked) -> Iterator[Page]:
     tools = _tools_of(options)
     found: dict[str, list[Result]] = {tool: [] for tool in tools}
     for seed in range(options.first_seed, options.first_seed + options.seeds):
-        cases = [Case(mode, true, seed) for mode, true in product(options.modes, options.counts)]
+        cases = [
+            Case(mode, true, seed, options.jagged) for mode, true in product(options.modes, options.counts)
+        ]
         if options.pictures:
             for case in cases:
                 write_atomically(options.pictures / f"{case.name}.png", encode_png(case.known.pixels))

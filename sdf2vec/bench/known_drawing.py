@@ -108,6 +108,7 @@ class KnownScene:
     side: int  # pixels
     background: Color
     shapes: tuple[KnownShape, ...] = ()
+    jagged: bool = False  # whether it is drawn without antialiasing
 
     @property
     def is_sharp(self) -> bool:
@@ -229,7 +230,8 @@ def svg_of(known: KnownScene) -> str:
         for i, shape in enumerate(known.shapes)
     )
     ground = f'<rect width="{side}" height="{side}" fill="{_css(known.background)}"/>'
-    head = f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {side} {side}">'
+    edges = ' shape-rendering="crispEdges"' if known.jagged else ""
+    head = f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {side} {side}"{edges}>'
     return f"{head}<defs>{masks}</defs>{ground}{drawn}</svg>"
 
 

@@ -99,3 +99,14 @@ def test_what_a_fit_is_told(monkeypatch, capsys, words, told):
     kind = {} if told == "auto" else {"kind": known.KINDS}
     assert asked == [(told, {"seed": 0, "preset": "fast"} | kind)]
     assert "sdf2vec, apart-02-00: 0 of 2 shapes" in capsys.readouterr().err
+
+
+def test_jagged_scenes_have_the_colours_of_their_shapes_alone(require_engine):
+    """And the same shapes as with antialiasing, at the same place."""
+    require_engine("resvg")
+    jagged, smooth = (Case("apart", 4, 2, jagged).known for jagged in (True, False))
+    assert jagged.shapes == smooth.shapes
+    assert len(np.unique(jagged.pixels.reshape(-1, 3), axis=0)) == 5
+    assert len(np.unique(smooth.pixels.reshape(-1, 3), axis=0)) > 5
+    assert abs(np.mean(jagged.pixels - smooth.pixels)) < 1e-3
+    assert Case("apart", 4, 3, True).edges == "jagged"
