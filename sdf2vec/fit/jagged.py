@@ -13,11 +13,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..arrays import BoolArray, Float32Array
+from ..arrays import BoolArray, Float32Array, Float64Array
 
 ALIKE = 3.5 / 255  # by which pixels of one colour differ at most
 STEPPED = 0.5  # share of the corners that are at steps of one pixel, of slopes
-UNSURE = 0.4  # of the squares of what smoothing changes so much is still wrong, at most: the edge's place in pixels
+UNSURE = 0.5  # of the squares of what smoothing changes so much is still wrong, at most: the edge's place in pixels
 
 
 def is_jagged(pixels: Float32Array) -> bool:
@@ -54,13 +54,15 @@ def _reached(pixels: Float32Array) -> tuple[Float32Array, Float32Array]:
 
 @dataclass(frozen=True)
 class _Runs:
-    """Straight stretches of edges below rows of pixels, and at which of their ends the edge goes one pixel up."""
+    """Straight stretches of edges below rows of pixels; where the edge goes on a pixel higher before or after one, how
+    many of its pixels lie on the slope to there, else 0.
+    """
 
     row: np.ndarray
     first: np.ndarray
     length: np.ndarray
-    rises_before: BoolArray
-    rises_after: BoolArray
+    before: Float64Array
+    after: Float64Array
 
     @classmethod
     def below(cls, pixels: Float32Array) -> _Runs:
@@ -73,29 +75,34 @@ class _Runs:
             falling = _alike(padded[1:-1, 1:], padded[2:, :-1])
         goes_on = edge[:, :-1] & edge[:, 1:] & beside[1:-1] & beside[2:]
         starts = edge & ~np.pad(goes_on, ((0, 0), (1, 0)))
-        ends = edge & ~np.pad(goes_on, ((0, 0), (0, 1)))
         row, first = np.nonzero(starts)
-        last = np.nonzero(ends)[1]
+        last = np.nonzero(edge & ~np.pad(goes_on, ((0, 0), (0, 1))))[1]
         # what is below rises beside the end by one pixel: there above it the edge goes on
-        after = edge[:, :-1] & beside[2:] & falling & beside[:-2] & under[:-1, :-1]
-        before = edge[:, 1:] & beside[2:] & rising & beside[:-2] & under[:-1, 1:]
-        rises_after = np.pad(after, ((0, 0), (0, 1)))[row, last]
-        rises_before = np.pad(before, ((0, 0), (1, 0)))[row, first]
-        return cls(row, first - 1, last - first + 1, rises_before, rises_after)
+        rises_after = edge[:, :-1] & beside[2:] & falling & beside[:-2] & under[:-1, :-1]
+        rises_before = edge[:, 1:] & beside[2:] & rising & beside[:-2] & under[:-1, 1:]
+        number, length = np.cumsum(starts).reshape(starts.shape) - 1, last - first + 1
+
+        def slope(rises: BoolArray, end: np.ndarray, beyond: np.ndarray) -> Float64Array:
+            """Half of it, or as much as beyond the step, if that is less: it is straight between two curves."""
+            next_length = length[number[row - 1, np.clip(beyond, 0, number.shape[1] - 1)]]
+            return np.where(rises[row, end], np.minimum(0.5 * length, next_length), 0.0)
+
+        before = slope(np.pad(rises_before, ((0, 0), (1, 0))), first, first - 1)
+        after = slope(np.pad(rises_after, ((0, 0), (0, 1))), last, last + 1)
+        return cls(row, first - 1, length, before, after)
 
     @property
     def steps(self) -> int:
         """How often an edge goes on in its direction a pixel higher."""
-        return int(self.rises_before.sum() + self.rises_after.sum())
+        return int(np.count_nonzero(self.before) + np.count_nonzero(self.after))
 
     def parts(self) -> Iterator[tuple[np.ndarray, np.ndarray, Float32Array]]:
         """Rows, columns and shares of pixels above the edges into which what is below reaches, for both ends."""
         index = np.repeat(np.arange(len(self.row)), self.length)
         along = np.arange(len(index)) - np.repeat(np.cumsum(self.length) - self.length, self.length)
-        length = self.length[index]
-        for rises, place in ((self.rises_before, along), (self.rises_after, length - 1 - along)):
-            chosen = rises[index]
-            share = _triangle(place[chosen], length[chosen])
+        for slope, place in ((self.before, along), (self.after, self.length[index] - 1 - along)):
+            chosen = place < slope[index]
+            share = _triangle(place[chosen], slope[index][chosen])
             yield self.row[index][chosen], (self.first[index] + along)[chosen], share
 
 
@@ -108,7 +115,7 @@ def _alike(one: np.ndarray, other: np.ndarray) -> BoolArray:
 
 
 def _triangle(place: np.ndarray, length: np.ndarray) -> Float32Array:
-    """The area, in pixels from `place` to the next, below a line from half a pixel to nothing in the middle."""
-    begin, end = (np.minimum(2.0 * each / length, 1.0) for each in (place, place + 1))
-    area: Float32Array = (0.25 * length * ((end - begin) - 0.5 * (end**2 - begin**2))).astype(np.float32)
+    """The area, from `place` to the next, below a line that falls from half a pixel to nothing in a length."""
+    begin, end = (np.minimum(each / length, 1.0) for each in (place, place + 1))
+    area: Float32Array = (0.5 * length * ((end - begin) - 0.5 * (end**2 - begin**2))).astype(np.float32)
     return area

@@ -85,3 +85,12 @@ def test_what_is_antialiased_beside_it_stays():
     made = smoothed(both)
     assert np.array_equal(made[:, :SIDE], smoothed(jagged))
     assert np.mean((made[:, SIDE:] - smooth) ** 2) < 0.1 * np.mean((made[:, :SIDE] - jagged) ** 2)
+
+
+def test_straight_sides_between_round_corners_stay():
+    """A side of 20 pixels; its last 4 on both sides, as many as there are beyond the step, lie on the slope."""
+    picture = np.zeros((12, 40, 1), np.float32)
+    picture[4:, 6:34] = picture[3, 10:30] = 1.0
+    made = smoothed(picture)
+    assert np.array_equal(made[3, 14:26], picture[3, 14:26])
+    assert np.allclose(made[3, 10:14, 0], 1 - np.array([7, 5, 3, 1]) / 16)
