@@ -155,7 +155,9 @@ def _searched(picture: Picture, settings: Settings, callback: Callback, flat: bo
     if settings.shapes == AUTO:
         if drawing.gave_up:
             return None
-        if drawing.error <= drawing.good:
+        if drawing.error <= drawing.good and (
+            settings.target_psnr is None or missed(found, picture, settings) <= 0
+        ):
             return Fitted(found, _counted(found))
         if settings.target_psnr is None:
             enough = _enough(picture, settings, found, drawing.sizes.last, callback)
@@ -314,15 +316,18 @@ class Drawing:
 
     def _wanted(self) -> tuple[Float32Array, float]:
         """The pixels that are looked for, without steps at the edges, and the mean squared error that any scene may
-        have: of a target, or what these leave unsure.
+        have: what these leave unsure, or of a target, of which the steps take their part. As it is where no smooth edge
+        would meet that.
         """
-        pixels = self.picture.premultiplied
-        if self.settings.target_psnr is not None:
-            return pixels, 10 ** (-self.settings.target_psnr / 10)
+        pixels, target = self.picture.premultiplied, self.settings.target_psnr
+        allowed = 0.0 if target is None else 10 ** (-target / 10)
         if self.picture.width * self.picture.height > (FINE * LAST) ** 2 or not is_jagged(pixels):
-            return pixels, 0.0
+            return pixels, allowed
         smooth = smoothed(pixels)
-        return smooth, UNSURE * float(np.mean((smooth - pixels) ** 2))
+        steps = float(np.mean((smooth - pixels) ** 2))
+        if target is None:
+            return smooth, UNSURE * steps
+        return (smooth, allowed - steps) if allowed > steps else (pixels, allowed)
 
     def found(self) -> Scene:
         """The scene, as simple as it may be."""
