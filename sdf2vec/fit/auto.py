@@ -30,7 +30,7 @@ from .descents import Sizes, finished, softer
 from .description import description_length
 from .digits import concise, fit_concisely
 from .initialization import FAINTEST_GROUND, Layers, background_of, empty_groups
-from .jagged import UNSURE, is_jagged, smoothed
+from .jagged import ALIKE, UNSURE, is_jagged, smoothed
 from .joining import Search
 from .loop import Callback, Progress, Stopped
 from .matching_pursuit import Painted, find_discs
@@ -53,7 +53,6 @@ SEARCH, JOINT, LAST = 56, 128, 320  # pixels squared
 FINE = 4  # times that size, beyond which the steps of an edge are not seen
 FEW = 4  # shapes that are placed by trial, of any picture, also where their number is given
 SOME = 256  # shapes that are, of a drawing, where their number is given
-LEVELS = 3.5 / 255  # by which pixels of one flat colour differ at most
 STEADY = 1.5 / 255  # by which they do of a drawing: photographs have noise
 FLAT = 0.6  # share of pixels next to the same colour, of a drawing in flat colours
 PHOTOGRAPH, STILL_FLAT = 128, 0.58  # pixels squared, and how flat a drawing is there
@@ -261,7 +260,7 @@ def is_flat(picture: Picture) -> bool:
     return flatness(picture.premultiplied, STEADY) >= FLAT
 
 
-def flatness(pixels: np.ndarray, levels: float = LEVELS) -> float:
+def flatness(pixels: np.ndarray, levels: float = ALIKE) -> float:
     """The share of pixels [H, W, C] that have the colour of their neighbours, about."""
     across = np.abs(np.diff(pixels, axis=1)).max(axis=2, initial=0.0) <= levels
     down = np.abs(np.diff(pixels, axis=0)).max(axis=2, initial=0.0) <= levels
@@ -435,7 +434,7 @@ def ground_of(target: torch.Tensor) -> torch.Tensor:
     rim[1:-1, 1:-1] = 0.0
     for weights in (rim.flatten(), torch.ones(len(colors))):
         common = common_color(colors, weights)
-        near = (colors - common).abs().amax(1) < LEVELS
+        near = (colors - common).abs().amax(1) < ALIKE
         if float(near.float().mean()) >= DOMINANT:
             return torch.cat([common, torch.ones(1)])
     return torch.cat([colors.mean(0), torch.ones(1)])

@@ -44,11 +44,10 @@ def smoothed(pixels: Float32Array) -> Float32Array:
 def _reached(pixels: Float32Array) -> tuple[Float32Array, Float32Array]:
     """The share [H, W] of each pixel that the colours above and below it reach into, and these, times it [H, W, C]."""
     share, color = np.zeros(pixels.shape[:2], np.float32), np.zeros_like(pixels)
-    for runs, flipped in ((_Runs.below(pixels), False), (_Runs.below(pixels[::-1]), True)):
-        for row, column, part in runs.parts():
-            own, other = (len(pixels) - 1 - row, len(pixels) - 2 - row) if flipped else (row, row + 1)
-            np.add.at(share, (own, column), part)
-            np.add.at(color, (own, column), part[:, None] * pixels[other, column])
+    for picture, shares, colors in ((pixels, share, color), (pixels[::-1], share[::-1], color[::-1])):
+        for row, column, part in _Runs.below(picture).parts():
+            np.add.at(shares, (row, column), part)
+            np.add.at(colors, (row, column), part[:, None] * picture[row + 1, column])
     return share, color
 
 
