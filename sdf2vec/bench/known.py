@@ -36,12 +36,15 @@ EDGES = ("sharp", "soft", JAGGED)
 
 
 class Case(NamedTuple):
-    """One scene, by what it is made from: a soft one for every odd seed, or all sharp and without antialiasing."""
+    """One scene, by what it is made from: a soft one for every odd seed, or all sharp and without antialiasing; and the
+    quality of the JPEG that is given of it.
+    """
 
     mode: str
     true: int
     seed: int
     jagged: bool = False
+    quality: int | None = None
 
     @property
     def name(self) -> str:
@@ -54,11 +57,11 @@ class Case(NamedTuple):
     @property
     def known(self) -> KnownScene:
         known = known_scene(self.true, self.mode, self.edges == "soft", self.seed)
-        return replace(known, jagged=self.jagged)
+        return replace(known, jagged=self.jagged, quality=self.quality)
 
 
 class Result(NamedTuple):
-    """What a tool made of a scene; the pictures, true and found, side by side for the figure."""
+    """What a tool made of a scene; the pictures, given and found, side by side for the figure."""
 
     case: Case
     verdict: Verdict
@@ -71,7 +74,7 @@ class Result(NamedTuple):
 def fitted(known: KnownScene, shapes: int | str, **options: Any) -> Answer:
     """What this program finds; `options` as in `api.fit`."""
     started = time.process_time()
-    scene = api.fit(Picture(known.pixels), shapes, **options)  # type: ignore[arg-type] # "auto", where it can
+    scene = api.fit(Picture(known.given), shapes, **options)  # type: ignore[arg-type] # "auto", where it can
     return scene_answer(scene, time.process_time() - started)
 
 
@@ -85,7 +88,7 @@ def by_fit(case: Case, known: KnownScene, options: argparse.Namespace) -> Answer
 
 def by_vtracer(case: Case, known: KnownScene, options: argparse.Namespace) -> Answer:
     """vtracer at its defaults."""
-    svg, seconds = drawn_by("vtracer", encode_png(known.pixels))
+    svg, seconds = drawn_by("vtracer", encode_png(known.given))
     return svg_answer(svg, known.side, seconds)
 
 
@@ -117,7 +120,7 @@ def result(tool: str, case: Case, known: KnownScene, options: argparse.Namespace
     """One scene through one tool."""
     answer = TOOLS[tool](case, known, options)
     verdict = judged(known, answer)
-    return Result(case, verdict, np.vstack([known.pixels, _gutter(known.side, across=True), answer.pixels]))
+    return Result(case, verdict, np.vstack([known.given, _gutter(known.side, across=True), answer.pixels]))
 
 
 # --- the page -----------------------------------------------------------------------------------------------
@@ -168,7 +171,7 @@ def _rows(name: str, true: str, results: list[Result]) -> Iterator[str]:
 
 
 def figure(results: list[Result]) -> bytes:
-    """A PNG: a column for each number of shapes; true above found, sharp and soft of each mode."""
+    """A PNG: a column for each number of shapes; given above found, sharp and soft of each mode."""
     rows = []
     for mode, edges in product(MODES, EDGES):
         first: dict[int, Float32Array] = {}
@@ -201,7 +204,9 @@ def page(found: dict[str, list[Result]], asked: Asked) -> Page:
     for tool, results in found.items():
         suffix = f".{tool}.png"
         figures[suffix] = figure(results)
-        shown = asked.figure(suffix, "The first of each: the true picture above, what was found below")
+        shown = asked.figure(
+            suffix, "The first of each: the picture that was given above, what was found below"
+        )
         parts += [f"## {tool}", "\n".join(table(results)), shown]
     return asked.page("Known scenes found again", *parts, figures=figures)
 
@@ -210,7 +215,8 @@ ABOUT = """Pictures of {side} × {side} pixels, made by code from so many circle
 upright and turned, opaque and translucent, some with a hole. Those of even seeds are sharp and drawn by resvg; \
 in those of odd seeds about half of the shapes have soft edges, and they are drawn by samples in numpy: no \
 renderer of this program has a part in it. With `--jagged` all are sharp, and drawn by resvg without antialiasing \
-(`crispEdges`). `apart`: no two touch; `overlap`: every second lies on others, and at \
+(`crispEdges`). With `--jpeg` the tools are given a JPEG of the picture, its colour at half the resolution; what they \
+find is judged by the picture before. `apart`: no two touch; `overlap`: every second lies on others, and at \
 least 60 % of each is not hidden.
 
 Found / true: shapes found for each one that there is (layers, or elements of an SVG but for a background; of a \
@@ -254,6 +260,12 @@ def add_choices(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--jagged", action="store_true", help="all sharp, and drawn by resvg without antialiasing"
     )
+    parser.add_argument(
+        "--jpeg",
+        type=choices.reader(choices.whole_number(1, 95)),
+        metavar="QUALITY",
+        help="what is given is a JPEG of the picture, by which it is judged",
+    )
     numbers = choices.reader(choices.several(choices.whole_number(0)))
     choices.add_list(parser, "--counts", numbers, ",".join(map(str, COUNTS)), "how many shapes there are")
     choices.add_list(parser, "--modes", choices.names("mode", MODES), ",".join(MODES), "how shapes lie")
@@ -266,11 +278,12 @@ def pages(options: argparse.Namespace, asked: Asked) -> Iterator[Page]:
     found: dict[str, list[Result]] = {tool: [] for tool in tools}
     for seed in range(options.first_seed, options.first_seed + options.seeds):
         cases = [
-            Case(mode, true, seed, options.jagged) for mode, true in product(options.modes, options.counts)
+            Case(mode, true, seed, options.jagged, options.jpeg)
+            for mode, true in product(options.modes, options.counts)
         ]
         if options.pictures:
             for case in cases:
-                write_atomically(options.pictures / f"{case.name}.png", encode_png(case.known.pixels))
+                write_atomically(options.pictures / f"{case.name}.png", encode_png(case.known.given))
             continue
         for case in cases:
             known = case.known

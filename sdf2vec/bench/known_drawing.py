@@ -6,6 +6,7 @@ plainly, so that a mistake in the program's own expressions shows.
 
 from __future__ import annotations
 
+import io
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -13,10 +14,12 @@ from functools import cached_property
 from typing import Any
 
 import numpy as np
+from PIL import Image
 from scipy.special import expit
 
 from ..arrays import Float32Array, Float64Array
 from ..engines import resvg
+from ..image import load
 from ..scene import Color, Joint, Layer, Scene, Shape
 
 SAMPLES = 8  # a pixel's, across and down
@@ -109,6 +112,7 @@ class KnownScene:
     background: Color
     shapes: tuple[KnownShape, ...] = ()
     jagged: bool = False  # whether it is drawn without antialiasing
+    quality: int | None = None  # of the JPEG that a tool is given of it
 
     @property
     def is_sharp(self) -> bool:
@@ -126,6 +130,15 @@ class KnownScene:
         """The picture, [side, side, 3], rounded to 8 bits: a sharp one as resvg draws it."""
         drawn = resvg.render(svg_of(self), self.side, self.side)[..., :3] if self.is_sharp else sampled(self)
         return (np.rint(drawn * 255) / 255).astype(np.float32)
+
+    @property
+    def given(self) -> Float32Array:
+        """The picture that a tool is given: itself, or what a JPEG makes of it."""
+        if self.quality is None:
+            return self.pixels
+        file = io.BytesIO()
+        Image.fromarray(np.rint(self.pixels * 255).astype(np.uint8)).save(file, "JPEG", quality=self.quality)
+        return load(file.getvalue()).pixels
 
 
 # --- signed distances ---------------------------------------------------------------------------------------

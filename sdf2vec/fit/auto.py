@@ -13,11 +13,9 @@ from contextlib import suppress
 from dataclasses import dataclass, replace
 from functools import partial
 
-import numpy as np
 import torch
 from msgspec import structs
 
-from ..arrays import Float32Array
 from ..image import Picture
 from ..paints import FLAT as ONE_COLOR
 from ..quality import psnr_of
@@ -29,11 +27,11 @@ from .byte_budget import Share, within
 from .descents import Sizes, finished, softer
 from .description import description_length
 from .digits import concise, fit_concisely
+from .drawings import Drawn, is_photograph
 from .initialization import FAINTEST_GROUND, Layers, background_of, empty_groups
-from .jagged import ALIKE, UNSURE, is_jagged, smoothed
+from .jagged import ALIKE
 from .joining import Search
 from .loop import Callback, Progress, Stopped
-from .matching_pursuit import Painted, find_discs
 from .mending import SLIGHTLY, exchanged, merged
 from .offers import common_color
 from .one_more import gain_of_one_more
@@ -50,17 +48,8 @@ from .views import scaled, view_of
 
 THOROUGHLY = 12  # layers, at most, which in the end are tried without even where they matter
 SEARCH, JOINT, LAST = 56, 128, 320  # pixels squared
-FINE = 4  # times that size, beyond which the steps of an edge are not seen
 FEW = 4  # shapes that are placed by trial, of any picture, also where their number is given
 SOME = 256  # shapes that are, of a drawing, where their number is given
-STEADY = 1.5 / 255  # by which they do of a drawing: photographs have noise
-FLAT = 0.6  # share of pixels next to the same colour, of a drawing in flat colours
-PHOTOGRAPH, STILL_FLAT = 128, 0.58  # pixels squared, and how flat a drawing is there
-DISCS = 24  # of a soft drawing so many discs leave at most
-LEFT = 0.15  # this share of its variance,
-LITTLE_LEFT = 0.08  # or this, where it is as rough as photographs are
-SMOOTH = 0.6  # share of pixels that are about the mean of those beside them, of what is smooth
-DISC_RESOLUTION = 48
 # of the error so much, 2 dB less, is left by so many rounds that no longer find much; from so many layers on
 LAST_ROUNDS, SLOW, SEVERAL = 3, 10**-0.2, 16
 GROWN = 1.5  # times the layers that could be told by their outlines, where these are not most of the drawing
@@ -130,24 +119,24 @@ def _few(picture: Picture, settings: Settings, callback: Callback) -> Fitted | N
     """The scene of a drawing, or of few shapes; None where it is to be painted."""
     if not _may_be_few(settings):
         return None
-    flat = is_flat(picture)
-    if not _is_searched(picture, settings, flat):
+    drawn = Drawn.of(picture)
+    if not _is_searched(drawn, settings):
         return None
-    shading = Shading.of(picture) if flat else None
+    shading = Shading.of(drawn.pixels) if drawn.flat else None
     if shading is None:
-        return _searched(picture, settings, callback, flat)
+        return _searched(drawn, settings, callback)
     ground = _ground_shade(shading, settings)
     fewer = settings if ground is None else _one_less(settings)
-    found = _searched(shading.flattened, fewer, callback, flat)
+    found = _searched(drawn.flattened(shading.flattened), fewer, callback)
     if found is None:
         return None
-    drawing = Drawing(picture, settings, callback, flat)
+    drawing = Drawing(drawn, settings, callback)
     return _told(drawing.finished(repainted(found.scene, shading, ground)), picture, settings)
 
 
-def _searched(picture: Picture, settings: Settings, callback: Callback, flat: bool) -> Fitted | None:
-    """The same of a picture without gradients, `flat` or not."""
-    drawing = Drawing(picture, settings, callback, flat)
+def _searched(drawn: Drawn, settings: Settings, callback: Callback) -> Fitted | None:
+    """The same of a picture without gradients."""
+    drawing, picture = Drawing(drawn, settings, callback), drawn.picture
     found = drawing.found()
     if drawing.stopped:
         return _told(found, picture, settings)
@@ -235,11 +224,11 @@ def _may_be_few(settings: Settings) -> bool:
     return plain and few and not more and bool(settings.drawn_kinds) and settings.target_flip is None
 
 
-def _is_searched(picture: Picture, settings: Settings, flat: bool) -> bool:
-    """Whether shapes are looked for in a picture, `flat` or not: in any if they are few, else in drawings."""
+def _is_searched(drawn: Drawn, settings: Settings) -> bool:
+    """Whether shapes are looked for in a picture: in any if they are few, else in drawings."""
     if settings.shapes != AUTO and not _is_some(settings):
         return True
-    return (flat or settings.shapes == AUTO) and not is_photograph(picture, flat)
+    return (drawn.flat or settings.shapes == AUTO) and not is_photograph(drawn)
 
 
 def _is_some(settings: Settings) -> bool:
@@ -255,78 +244,22 @@ def _going_on(settings: Settings, found: Scene) -> Settings:
 # --- drawings -------------------------------------------------------------------------------------------------
 
 
-def is_flat(picture: Picture) -> bool:
-    """Whether most pixels have the colour of their neighbours, to within a level."""
-    return flatness(picture.premultiplied, STEADY) >= FLAT
-
-
-def flatness(pixels: np.ndarray, levels: float = ALIKE) -> float:
-    """The share of pixels [H, W, C] that have the colour of their neighbours, about."""
-    across = np.abs(np.diff(pixels, axis=1)).max(axis=2, initial=0.0) <= levels
-    down = np.abs(np.diff(pixels, axis=0)).max(axis=2, initial=0.0) <= levels
-    return min(share(across), share(down))
-
-
-def is_photograph(picture: Picture, flat: bool) -> bool:
-    """Whether a picture, `flat` at its own size or not, is no drawing: not flat, or not where it is small; nor soft."""
-    if flat:
-        small = scaled(picture.premultiplied, PHOTOGRAPH).permute(1, 2, 0).numpy()
-        flat = flatness(small) >= STILL_FLAT
-    return not flat and not _is_soft(picture)
-
-
-def share(chosen: np.ndarray) -> float:
-    """The share of what is true; of nothing, all."""
-    return float(chosen.mean()) if chosen.size else 1.0
-
-
-def _is_soft(picture: Picture) -> bool:
-    """Whether a few discs come near to the picture, as they do not to a photograph."""
-    target = scaled(picture.premultiplied, DISC_RESOLUTION)
-    image = target.flatten(1).median(1).values[:, None, None].expand_as(target).clone()
-    before = (image - target).square().mean()
-    find_discs(Painted(image, target, torch.ones(target.shape[1:])), DISCS)
-    left = LEFT if smoothness(picture.premultiplied) >= SMOOTH else LITTLE_LEFT
-    return bool((image - target).square().mean() <= left * before)
-
-
-def smoothness(pixels: np.ndarray) -> float:
-    """The share of pixels [H, W, C] that are the mean of those beside them, to within a level, about."""
-    bent = (np.abs(np.diff(pixels, 2, axis=axis)).max(axis=2, initial=0.0) for axis in (0, 1))
-    return min(share(each <= STEADY) for each in bent)
-
-
 class Drawing:
     """The search for the few shapes that a picture is made of."""
 
-    def __init__(self, picture: Picture, settings: Settings, callback: Callback, flat: bool) -> None:
-        self.picture, self.settings, self.callback, self.flat = picture, settings, callback, flat
+    def __init__(self, drawn: Drawn, settings: Settings, callback: Callback) -> None:
+        self.picture, self.settings, self.callback, self.flat = drawn.picture, settings, callback, drawn.flat
         self.stopped, self.gave_up, self.error = False, False, math.inf
-        pixel = pixel_of(picture)
-        self.size = (picture.width * pixel, picture.height * pixel)
+        pixel = pixel_of(self.picture)
+        self.size = (self.picture.width * pixel, self.picture.height * pixel)
         generator = torch.Generator().manual_seed(settings.seed)
         layers = Layers(settings.drawn_kinds, settings.compositing)
         self.search = Search(layers, preset_of(settings).falloff, generator, self._tick, pixel)
-        pixels, self.worst = self._wanted()
+        pixels, self.worst = drawn.wanted(settings.target_psnr)
         self.floor = self.worst if settings.target_psnr is not None else max(FLOOR, self.worst)
         self.good = self.floor if settings.target_psnr is not None else max(GOOD, self.worst)
         self.sizes = Sizes(*(view_of(pixels, settings, r) for r in (SEARCH, JOINT, LAST)))
         self.scene = SceneTensors([], ground_of(self.sizes.joint.target), settings.compositing, self.size)
-
-    def _wanted(self) -> tuple[Float32Array, float]:
-        """The pixels that are looked for, without steps at the edges, and the mean squared error that any scene may
-        have: what these leave unsure, or of a target, of which the steps take their part. As it is where no smooth edge
-        would meet that.
-        """
-        pixels, target = self.picture.premultiplied, self.settings.target_psnr
-        allowed = 0.0 if target is None else 10 ** (-target / 10)
-        if self.picture.width * self.picture.height > (FINE * LAST) ** 2 or not is_jagged(pixels):
-            return pixels, allowed
-        smooth = smoothed(pixels)
-        steps = float(np.mean((smooth - pixels) ** 2))
-        if target is None:
-            return smooth, UNSURE * steps
-        return (smooth, allowed - steps) if allowed > steps else (pixels, allowed)
 
     def found(self) -> Scene:
         """The scene, as simple as it may be."""

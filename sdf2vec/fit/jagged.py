@@ -17,7 +17,6 @@ from ..arrays import BoolArray, Float32Array, Float64Array
 
 ALIKE = 3.5 / 255  # by which pixels of one colour differ at most
 STEPPED = 0.5  # share of the corners that are at steps of one pixel, of slopes
-UNSURE = 0.5  # of the squares of what smoothing changes so much is still wrong, at most: the edge's place in pixels
 
 
 def is_jagged(pixels: Float32Array) -> bool:

@@ -64,21 +64,21 @@ class Shade(NamedTuple):
 
 @dataclass(frozen=True)
 class Shading:
-    """The regions of a picture, by number from 1, 0 for none [H, W], where it is small; and what they are painted with.
+    """The regions of premultiplied pixels, by number from 1, 0 for none [H, W], where these are scaled down; and what
+    they are painted with.
 
     Parts of one colour or gradient are one region, wherever they are.
     """
 
-    picture: Picture
+    pixels: Float32Array
     labels: IntArray
     shades: tuple[Shade, ...]
 
     @classmethod
-    def of(cls, picture: Picture) -> Shading | None:
-        """That of a picture; None where no region of it is a gradient with sharp edges."""
-        pixels = scaled(picture.premultiplied, LOOKED).permute(1, 2, 0).numpy()
-        labels, shades = _regions(pixels)
-        found = cls(picture, labels, tuple(shades))
+    def of(cls, pixels: Float32Array) -> Shading | None:
+        """That of pixels [H, W, C]; None where no region of them is a gradient with sharp edges."""
+        labels, shades = _regions(scaled(pixels, LOOKED).permute(1, 2, 0).numpy())
+        found = cls(pixels, labels, tuple(shades))
         return found if found.graded else None
 
     @cached_property
@@ -134,12 +134,12 @@ class Shading:
     @cached_property
     def flattened(self) -> Picture:
         """The picture without its gradients: each is of a colour that it has."""
-        before = self.picture.premultiplied
+        before = self.pixels
         flat = before.copy()
         for number in self.graded:
             self._flatten(number, before, flat)
         flat = flat.clip(0.0, 1.0)
-        return Picture(unpremultiply(flat) if self.picture.has_alpha else flat)
+        return Picture(unpremultiply(flat) if flat.shape[2] == 4 else flat)
 
     def _flatten(self, number: int, before: Float32Array, flat: Float32Array) -> None:
         """Puts a colour in the place of a gradient of a picture [H, W, C], `flat`."""

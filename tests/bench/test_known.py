@@ -8,9 +8,9 @@ from PIL import Image
 
 from sdf2vec import Scene, api
 from sdf2vec.bench import known
-from sdf2vec.bench.known import Case, Result
+from sdf2vec.bench.known import Case, Result, fitted
 from sdf2vec.bench.known_drawing import svg_of
-from sdf2vec.bench.recovery import Verdict
+from sdf2vec.bench.recovery import Verdict, judged, psnr
 from tests.bench.command import bench
 
 
@@ -110,3 +110,21 @@ def test_jagged_scenes_have_the_colours_of_their_shapes_alone(require_engine):
     assert len(np.unique(smooth.pixels.reshape(-1, 3), axis=0)) > 5
     assert abs(np.mean(jagged.pixels - smooth.pixels)) < 1e-3
     assert Case("apart", 4, 3, True).edges == "jagged"
+
+
+def test_a_jpeg_is_given_and_the_picture_judged(require_engine, monkeypatch):
+    require_engine("resvg")
+    case = Case("apart", 2, 0, quality=50)
+    known = case.known
+    assert np.array_equal(known.pixels, Case("apart", 2, 0).known.pixels)
+    assert 25 < psnr(known.pixels, known.given) < 40
+    given = []
+
+    def fit(picture, shapes, **options):
+        given.append(picture.pixels)
+        return known.scene
+
+    monkeypatch.setattr(api, "fit", fit)
+    verdict = judged(known, fitted(known, "auto"))
+    assert np.array_equal(given, [known.given])
+    assert verdict.psnr > 45

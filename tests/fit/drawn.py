@@ -1,13 +1,16 @@
 """Pictures of 96 × 96 pixels drawn in numpy, by sixteen samples each: no renderer of this program has a part in it."""
 
+import io
+
 import numpy as np
 import torch
+from PIL import Image
 
 from sdf2vec.fit.initialization import Layers
 from sdf2vec.fit.joining import Search
 from sdf2vec.fit.shading import Shading
 from sdf2vec.fit.surroundings import View
-from sdf2vec.image import Picture
+from sdf2vec.image import Picture, load, resize
 from sdf2vec.scene import Layer, Shape
 
 WHITE, BLUE, RED, GREEN = (
@@ -85,4 +88,17 @@ def sharp_triangle(color, *corners):
 
 
 def shading_of(pixels):
-    return Shading.of(Picture(pixels.astype(np.float32)))
+    return Shading.of(pixels.astype(np.float32))
+
+
+def noise():
+    """Nothing that a few shapes could be."""
+    coarse = np.random.default_rng(0).random((8, 12, 3), dtype=np.float32)
+    return Picture(np.ascontiguousarray(resize(coarse, 48, 32)))
+
+
+def compressed(pixels, quality, **options):
+    """Opaque pixels as a JPEG gives them back, with colour at half the resolution if nothing else is said."""
+    file = io.BytesIO()
+    Image.fromarray(np.rint(pixels * 255).astype(np.uint8)).save(file, "JPEG", quality=quality, **options)
+    return load(file.getvalue()).pixels

@@ -13,8 +13,9 @@ from skimage import data
 from sdf2vec import Scene, Sdf2vecError, fit, fitted
 from sdf2vec.bench.known_scenes import known_scene
 from sdf2vec.fit import auto
-from sdf2vec.fit.auto import ground_of, is_flat
+from sdf2vec.fit.auto import ground_of
 from sdf2vec.fit.descents import finished
+from sdf2vec.fit.drawings import Drawn
 from sdf2vec.fit.initialization import Layers
 from sdf2vec.fit.joining import Search
 from sdf2vec.fit.one_more import gain_of_one_more
@@ -22,24 +23,18 @@ from sdf2vec.fit.pruning import FLOOR
 from sdf2vec.fit.settings import settings_of
 from sdf2vec.fit.sparse import Round
 from sdf2vec.fit.surroundings import View
-from sdf2vec.image import Picture, load, resize
+from sdf2vec.image import Picture, load
 from sdf2vec.quality import quality
 from sdf2vec.render.tensors import from_scene
 from sdf2vec.scene import Layer, Shape
-from tests.fit.drawn import BLUE, SIDE, disc, painted, sharp_disc
-from tests.fit.fitting import RED, remember
+from tests.fit.drawn import BLUE, SIDE, disc, noise, painted, sharp_disc
+from tests.fit.fitting import remember
 
 WHITE = '<rect width="100%" height="100%" fill="white"/>'
 DISC = '<circle cx="44" cy="50" r="24" fill="#d02040"/>'
 UNDER = '<circle cx="40" cy="40" r="22" fill="#2040d0"/>'
 OVER = '<rect x="38" y="44" width="40" height="30" fill="#10a050"/>'
 TRIANGLE = '<polygon points="70,8 90,34 60,30" fill="#e0a010"/>'
-
-
-def noise():
-    """Nothing that a few shapes could be."""
-    coarse = np.random.default_rng(0).random((8, 12, 3), dtype=np.float32)
-    return Picture(np.ascontiguousarray(resize(coarse, 48, 32)))
 
 
 def kinds_of(scene):
@@ -226,7 +221,7 @@ def test_an_enlarged_photograph_is_not_searched_for_as_many_shapes_as_told():
     """Its pixels are like their neighbours, but not where it is small."""
     large = Image.fromarray(data.astronaut()).resize((3400, 3400), Image.Resampling.BICUBIC)
     picture = Picture((np.asarray(large) / 255).astype(np.float32))
-    assert is_flat(picture)
+    assert Drawn.of(picture).flat
     assert auto._few(picture, settings_of(8), lambda progress: False) is None
 
 
@@ -259,27 +254,6 @@ def test_what_is_no_drawing_gets_as_many_shapes_as_are_allowed():
     assert found.scene.shape_count == 12
     assert "--max-shapes" in found.reason
     assert found.scene == fit(noise(), 12, preset="fast")
-
-
-@pytest.mark.parametrize("name", ["rocket", "camera", "brick"])
-def test_a_photograph_is_no_drawing_however_smooth(name):
-    """Pixels differ from their neighbours by a few levels, hardly by none: no shapes are searched."""
-    picture = load(getattr(data, name)())
-    assert auto.flatness(picture.premultiplied) > auto.FLAT
-    assert not auto.is_flat(picture)
-    assert auto.is_photograph(picture, flat=False)
-
-
-def test_a_soft_drawing_is_none_even_if_it_is_rough():
-    """As lossy formats leave it; of what is smooth discs may leave more."""
-    y, x = np.mgrid[0:96, 0:128].astype(np.float32)
-    disc = np.exp(-((x - 50) ** 2 + (y - 40) ** 2) / 900)[..., None] * np.array([0.2, 0.6, 0.7], np.float32)
-    rough = disc + np.random.default_rng(0).normal(0, 0.01, disc.shape).astype(np.float32)
-    for pixels in (disc, rough):
-        picture = Picture(np.clip(0.1 + pixels, 0, 1).astype(np.float32))
-        assert not auto.is_photograph(picture, flat=False)
-    assert auto.smoothness(disc) == 1.0
-    assert auto.smoothness(rough) < auto.SMOOTH
 
 
 def test_a_target_is_met_by_fewer_shapes():
@@ -324,14 +298,6 @@ def test_the_same_seed_finds_the_same(drawn):
     assert fit(picture, kind="ellipse", seed=1) == fit(picture, kind="ellipse", seed=1)
 
 
-def test_drawings_are_told_from_photographs():
-    flat = np.full((32, 48, 3), 0.5, np.float32)
-    flat[8:20, 10:30] = RED
-    assert is_flat(Picture(flat))
-    assert not is_flat(noise())
-    assert is_flat(Picture(np.zeros((1, 1, 3), np.float32)))
-
-
 def test_the_ground_is_the_colour_that_dominates():
     """Not the mean, which would have to be painted over everywhere."""
     target = np.full((3, 20, 20), 0.9, np.float32)
@@ -354,7 +320,7 @@ def test_a_soft_picture_takes_few_shapes():
     disc = np.clip((20 - np.hypot(x - 22, y - 15)) / 16, 0, 1)[..., None]
     picture = Picture((np.float32(0.9) - disc * np.array([0.2, 0.6, 0.7], np.float32)).astype(np.float32))
     found = fitted(picture, kind="circle")
-    assert not is_flat(picture)
+    assert not Drawn.of(picture).flat
     assert found.scene.shape_count <= 8  # its edge is straight, ours a sigmoid
     assert quality(found.scene, picture).psnr >= 35
 
@@ -462,7 +428,7 @@ def test_what_shortens_the_description_stays_even_where_nothing_seems_missing(co
     """Without a small grey dot the picture is 47 dB near; one of a quarter of a level does not pay for itself."""
     pixels = painted((disc(40, 40, 20), BLUE, 1.0), (disc(80, 80, radius), color, 1.0))
     drawing = auto.Drawing(
-        Picture(pixels.astype(np.float32)), settings_of(), lambda progress: False, flat=True
+        Drawn.of(Picture(pixels.astype(np.float32))), settings_of(), lambda progress: False
     )
     dot = sharp_disc(color, 80, 80, radius)
     scene = from_scene(Scene(SIDE, SIDE, (sharp_disc(BLUE, 40, 40), dot), (1.0, 1.0, 1.0)))
@@ -472,7 +438,7 @@ def test_what_shortens_the_description_stays_even_where_nothing_seems_missing(co
 
 def test_a_round_that_only_takes_layers_away_does_not_end_the_search():
     """Its error may be a little higher than before: that says nothing about how many more are needed."""
-    drawing = auto.Drawing(noise(), settings_of(), lambda progress: False, flat=True)
+    drawing = auto.Drawing(replace(Drawn.of(noise()), flat=True), settings_of(), lambda progress: False)
     drawing.scene = from_scene(_hidden(13, 0.5))
     assert not drawing._is_no_drawing(Round(from_scene(_hidden(12, 0.5)), 2e-4, 1e-4))
     assert drawing._is_no_drawing(Round(from_scene(_hidden(14, 0.5)), 2e-4, 1e-4))
@@ -497,7 +463,7 @@ def test_a_search_that_would_not_find_the_drawing_ends(outlined, gains, made, mo
     monkeypatch.setattr(auto, "taken_apart", lambda *rest: from_scene(_hidden(outlined, 0.5)))
     monkeypatch.setattr(auto, "grow", lambda *rest: rounds)
     monkeypatch.setattr(auto.Drawing, "_finish", lambda self: None)
-    auto.Drawing(noise(), settings_of(), lambda progress: False, flat=True).found()
+    auto.Drawing(replace(Drawn.of(noise()), flat=True), settings_of(), lambda progress: False).found()
     assert len(list(rounds)) == len(gains) - made
 
 

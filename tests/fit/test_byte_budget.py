@@ -6,14 +6,10 @@ import pytest
 from sdf2vec import Sdf2vecError, fitted, share_of
 from sdf2vec.export import packing
 from sdf2vec.fit import auto
-from sdf2vec.image import Picture, load, resize
+from sdf2vec.fit.drawings import Drawn, is_photograph
+from sdf2vec.image import load
+from tests.fit.drawn import noise
 from tests.scenes import random_scene
-
-
-def noise():
-    """Nothing that a few shapes could be."""
-    coarse = np.random.default_rng(0).random((8, 12, 3), dtype=np.float32)
-    return Picture(np.ascontiguousarray(resize(coarse, 48, 32)))
 
 
 def by_count(most, ground=0.0):
@@ -84,12 +80,12 @@ def test_in_a_photograph_no_drawing_is_looked_for(monkeypatch):
     x, y = np.meshgrid(np.linspace(0, 1, 640), np.linspace(0, 1, 640))
     hills = [np.sin(12 * x + 3 * y + c) * np.cos(11 * y - 4 * x * y) for c in range(3)]
     picture = load(0.5 + 0.25 * np.stack(hills, axis=2).astype(np.float32))
-    assert auto.is_flat(picture)
-    assert auto.is_photograph(picture, flat=True)
+    assert Drawn.of(picture).flat
+    assert is_photograph(Drawn.of(picture))
     drawing = load(
         np.pad(np.full((60, 80, 3), 0.3, np.float32), ((99, 99), (99, 99), (0, 0)), constant_values=0.8)
     )
-    assert not auto.is_photograph(drawing, flat=True)
+    assert not is_photograph(Drawn.of(drawing))
     monkeypatch.setattr(auto, "Drawing", lambda *given: pytest.fail("looked for a drawing"))
     fitted(picture, preset="fast", kind="circle", max_falloff=0.0, share=by_count(5))
     assert fitted(picture, preset="fast", kind="circle", max_shapes=5).scene.shape_count == 5

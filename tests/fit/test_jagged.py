@@ -3,7 +3,8 @@
 import numpy as np
 import pytest
 
-from sdf2vec.fit.jagged import UNSURE, is_jagged, smoothed
+from sdf2vec.fit.drawings import UNSURE
+from sdf2vec.fit.jagged import is_jagged, smoothed
 
 SIDE, SAMPLES = 96, 16
 SHAPES = {

@@ -8,6 +8,7 @@ import torch
 
 from sdf2vec.fit import descents, peeling, pruning, sparse
 from sdf2vec.fit.auto import Drawing
+from sdf2vec.fit.drawings import Drawn
 from sdf2vec.fit.peeling import peeled
 from sdf2vec.fit.region_graph import Regions
 from sdf2vec.fit.settings import settings_of
@@ -277,6 +278,6 @@ def test_edges_stay_sharp_where_much_is_missing():
 @pytest.mark.parametrize(("most", "layers"), [(2, 2), (1, 0)])
 def test_no_more_layers_are_taken_than_are_allowed(most, layers):
     pixels = painted((disc(30, 30, 20), BLUE, 1.0), (disc(66, 64, 20), RED, 1.0)).astype(np.float32)
-    drawing = Drawing(Picture(pixels), settings_of(), lambda progress: False, flat=True)
+    drawing = Drawing(Drawn.of(Picture(pixels)), settings_of(), lambda progress: False)
     found = sparse.taken_apart(drawing.scene, drawing.sizes, drawing.search, most)
     assert found.layer_count == layers

@@ -7,7 +7,6 @@ import pytest
 
 from sdf2vec.bench.known_scenes import known_scene
 from sdf2vec.fit.shading import Shading
-from sdf2vec.image import Picture
 from tests.fit.drawn import GREEN, HALF, RISE, SIDE, WHITE, box, disc, painted, ramp, shading_of
 
 
@@ -123,4 +122,4 @@ def test_what_has_no_gradient(pixels):
 def test_soft_edges_and_translucent_shapes_are_no_gradients(mode):
     for count, seed in ((2, 1), (4, 3), (8, 5), (16, 7), (32, 9)):
         pixels = np.asarray(known_scene(count, mode, bool(seed % 2), seed).pixels, np.float32)
-        assert Shading.of(Picture(pixels)) is None
+        assert Shading.of(pixels) is None

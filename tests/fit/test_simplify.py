@@ -5,6 +5,7 @@ import torch
 
 from sdf2vec import Scene, fit
 from sdf2vec.fit.auto import Drawing
+from sdf2vec.fit.drawings import Drawn
 from sdf2vec.fit.initialization import Layers
 from sdf2vec.fit.joining import Search
 from sdf2vec.fit.ramps import grounded, lowest
@@ -87,7 +88,7 @@ def test_a_ramp_is_found_under_shapes():
     pixels = ramp_of((0.0, 1 / 40))
     bare = pixels.copy()
     pixels[10:30, 20:50] = (1.0, 1.0, 1.0)
-    drawing = Drawing(Picture(pixels), settings_of(), lambda progress: False, flat=True)
+    drawing = Drawing(Drawn.of(Picture(pixels)), settings_of(), lambda progress: False)
     on_ramp = grounded(drawing.scene, drawing.sizes.joint, drawing.search)
     assert lowest(on_ramp) == 1
     assert quality(to_scene(on_ramp, 64, 40), Picture(bare)).psnr >= 40

@@ -1,0 +1,108 @@
+"""Whether a picture is a drawing, and what was drawn, before it was compressed or where it has no antialiasing."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+import torch
+
+from ..arrays import Float32Array
+from ..image import Picture
+from .jagged import ALIKE, is_jagged, smoothed
+from .matching_pursuit import Painted, find_discs
+from .ringing import has_ringing, restored
+from .views import scaled
+
+FINEST = 1280  # pixels squared, beyond which neither steps nor ringing are seen where shapes are looked for
+UNSURE = 0.5  # of the squares of what is changed so much is still wrong, at most
+STEADY = 1.5 / 255  # by which pixels of one flat colour differ at most in a drawing: photographs have noise
+FLAT = 0.6  # share of pixels next to the same colour, of a drawing in flat colours
+PHOTOGRAPH, STILL_FLAT = 128, 0.58  # pixels squared, and how flat a drawing is there
+CLEAN = 0.76  # the same where ringing has been taken away, as it has from photographs, too
+DISCS = 24  # of a soft drawing so many discs leave at most
+LEFT = 0.15  # this share of its variance,
+LITTLE_LEFT = 0.08  # or this, where it is as rough as photographs are
+SMOOTH = 0.6  # share of pixels that are about the mean of those beside them, of what is smooth
+DISC_RESOLUTION = 48
+
+
+@dataclass(frozen=True, eq=False)
+class Drawn:
+    """A picture and the premultiplied pixels [H, W, C] that were drawn: its own, or those without what a file or a want
+    of antialiasing made of them; the mean squared error between, and whether it is all flat colours but for edges.
+    """
+
+    picture: Picture
+    pixels: Float32Array
+    off: float
+    flat: bool
+
+    @classmethod
+    def of(cls, picture: Picture) -> Drawn:
+        """What was drawn of a picture."""
+        before = pixels = picture.premultiplied
+        flat = flatness(pixels, STEADY) >= FLAT
+        if picture.width * picture.height <= FINEST**2:
+            if has_ringing(pixels):
+                clean = restored(pixels)
+                if _small_flatness(clean) >= CLEAN:
+                    pixels, flat = clean, True
+            if is_jagged(pixels):
+                pixels = smoothed(pixels)
+        return cls(picture, pixels, float(np.mean((pixels - before) ** 2)), flat)
+
+    def flattened(self, picture: Picture) -> Drawn:
+        """The same without its gradients."""
+        return replace(self, picture=picture, pixels=picture.premultiplied)
+
+    def wanted(self, target_psnr: float | None) -> tuple[Float32Array, float]:
+        """The pixels that are looked for and the mean squared error that any scene may have: what these leave unsure,
+        or of a target, of which the difference from the picture takes its part. The picture as it is where nothing else
+        meets that.
+        """
+        if target_psnr is None:
+            return self.pixels, UNSURE * self.off
+        allowed: float = 10 ** (-target_psnr / 10)
+        return (
+            (self.pixels, allowed - self.off) if allowed > self.off else (self.picture.premultiplied, allowed)
+        )
+
+
+def flatness(pixels: np.ndarray, levels: float = ALIKE) -> float:
+    """The share of pixels [H, W, C] that have the colour of their neighbours, about."""
+    across = np.abs(np.diff(pixels, axis=1)).max(axis=2, initial=0.0) <= levels
+    down = np.abs(np.diff(pixels, axis=0)).max(axis=2, initial=0.0) <= levels
+    return min(share(across), share(down))
+
+
+def is_photograph(drawn: Drawn) -> bool:
+    """Whether a picture is no drawing: not in flat colours, or not where it is small; nor soft."""
+    flat = drawn.flat and _small_flatness(drawn.pixels) >= STILL_FLAT
+    return not flat and not _is_soft(drawn.pixels)
+
+
+def _small_flatness(pixels: Float32Array) -> float:
+    """The flatness of pixels where they are scaled down."""
+    return flatness(scaled(pixels, PHOTOGRAPH).permute(1, 2, 0).numpy())
+
+
+def share(chosen: np.ndarray) -> float:
+    """The share of what is true; of nothing, all."""
+    return float(chosen.mean()) if chosen.size else 1.0
+
+
+def _is_soft(pixels: Float32Array) -> bool:
+    """Whether a few discs come near to a picture, as they do not to a photograph."""
+    target = scaled(pixels, DISC_RESOLUTION)
+    image = target.flatten(1).median(1).values[:, None, None].expand_as(target).clone()
+    before = (image - target).square().mean()
+    find_discs(Painted(image, target, torch.ones(target.shape[1:])), DISCS)
+    left = LEFT if smoothness(pixels) >= SMOOTH else LITTLE_LEFT
+    return bool((image - target).square().mean() <= left * before)
+
+
+def smoothness(pixels: np.ndarray) -> float:
+    """The share of pixels [H, W, C] that are the mean of those beside them, to within a level, about."""
+    bent = (np.abs(np.diff(pixels, 2, axis=axis)).max(axis=2, initial=0.0) for axis in (0, 1))
+    return min(share(each <= STEADY) for each in bent)
