@@ -47,7 +47,10 @@ DUE = {  # from which share of the steps on numbers of a precision settle, and w
     "color": (0.5, 0.97),
 }
 LARGEST = 2048  # layers: more would take too long
-PARTS = 16  # of the formulas of all sorts of layers: kernels for more take too long to compile
+MOST_PARTS, ALL_PARTS = (
+    16,
+    64,
+)  # shapes of a layer; of one of each sort: kernels for more take too long to compile
 
 
 def views_of(picture: Picture) -> Views:
@@ -128,9 +131,9 @@ def descend(
     """
     parts = [len(group.structure) for group in tensors.groups]
     with threads_of_its_own():
-        if 0 < count_numbers(tensors) <= SOLVED and max(parts) <= PARTS and not softening:
+        if 0 < count_numbers(tensors) <= SOLVED and max(parts) <= MOST_PARTS and not softening:
             _by_least_squares(tensors, settling, views(PHASES[-1].resolution), scene.pixel, frozen)
-        elif 0 < tensors.layer_count <= LARGEST and sum(parts) <= PARTS:
+        elif 0 < tensors.layer_count <= LARGEST and sum(parts) <= ALL_PARTS:
             _descend(tensors, settling, views, scene.pixel, frozen, phases, softening)
     for group in settling:
         group.settle(1.0)
