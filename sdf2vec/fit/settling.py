@@ -47,10 +47,8 @@ DUE = {  # from which share of the steps on numbers of a precision settle, and w
     "color": (0.5, 0.97),
 }
 LARGEST = 2048  # layers: more would take too long
-MOST_PARTS, ALL_PARTS = (
-    16,
-    64,
-)  # shapes of a layer; of one of each sort: kernels for more take too long to compile
+MOST_PARTS = 16  # shapes of a layer
+ALL_PARTS = 64  # of one layer of each sort: kernels for more take too long to compile
 
 
 def views_of(picture: Picture) -> Views:
