@@ -134,11 +134,7 @@ class KnownScene:
     @property
     def given(self) -> Float32Array:
         """The picture that a tool is given: itself, or what a JPEG makes of it."""
-        if self.quality is None:
-            return self.pixels
-        file = io.BytesIO()
-        Image.fromarray(np.rint(self.pixels * 255).astype(np.uint8)).save(file, "JPEG", quality=self.quality)
-        return load(file.getvalue()).pixels
+        return self.pixels if self.quality is None else compressed(self.pixels, quality=self.quality)
 
 
 # --- signed distances ---------------------------------------------------------------------------------------
@@ -223,6 +219,15 @@ def _window(shape: KnownShape, count: int, samples: int) -> tuple[slice, slice]:
     ends = [(int((c - reach) * samples), int((c + reach) * samples)) for c in shape.figure.center]
     columns, rows = (slice(max(low, 0), max(min(high, count), 0)) for low, high in ends)
     return rows, columns
+
+
+def compressed(pixels: Float32Array, form: str = "JPEG", **options: Any) -> Float32Array:
+    """Opaque pixels as a lossy file gives them back that Pillow writes; a JPEG with colour at half the resolution, if
+    nothing else is said.
+    """
+    file = io.BytesIO()
+    Image.fromarray(np.rint(pixels * 255).astype(np.uint8)).save(file, form, **options)
+    return load(file.getvalue()).pixels
 
 
 def svg_of(known: KnownScene) -> str:

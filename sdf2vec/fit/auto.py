@@ -122,6 +122,7 @@ def _few(picture: Picture, settings: Settings, callback: Callback) -> Fitted | N
     drawn = Drawn.of(picture)
     if not _is_searched(drawn, settings):
         return None
+    drawn = drawn.antialiased
     shading = Shading.of(drawn.pixels) if drawn.flat else None
     if shading is None:
         return _searched(drawn, settings, callback)

@@ -9,7 +9,7 @@ import torch
 
 from ..arrays import Float32Array
 from ..image import Picture
-from .jagged import ALIKE, is_jagged, smoothed
+from .jagged import ALIKE, alike, is_jagged, smoothed
 from .matching_pursuit import Painted, find_discs
 from .ringing import has_ringing, restored
 from .views import scaled
@@ -30,27 +30,38 @@ DISC_RESOLUTION = 48
 @dataclass(frozen=True, eq=False)
 class Drawn:
     """A picture and the premultiplied pixels [H, W, C] that were drawn: its own, or those without what a file or a want
-    of antialiasing made of them; the mean squared error between, and whether it is all flat colours but for edges.
+    of antialiasing made of them; whether they are flat colours but for edges, and the mean squared error between.
     """
 
     picture: Picture
     pixels: Float32Array
-    off: float
     flat: bool
+    off: float = 0.0
 
     @classmethod
     def of(cls, picture: Picture) -> Drawn:
-        """What was drawn of a picture."""
-        before = pixels = picture.premultiplied
-        flat = flatness(pixels, STEADY) >= FLAT
-        if picture.width * picture.height <= FINEST**2:
-            if has_ringing(pixels):
-                clean = restored(pixels)
-                if _small_flatness(clean) >= CLEAN:
-                    pixels, flat = clean, True
-            if is_jagged(pixels):
-                pixels = smoothed(pixels)
-        return cls(picture, pixels, float(np.mean((pixels - before) ** 2)), flat)
+        """What was drawn of a picture, with its edges in steps."""
+        pixels = picture.premultiplied
+        found = cls(picture, pixels, flatness(pixels, STEADY) >= FLAT)
+        if found._is_fine and has_ringing(pixels):
+            clean = restored(pixels)
+            if _small_flatness(clean) >= CLEAN:
+                return replace(found._with(clean), flat=True)
+        return found
+
+    @property
+    def antialiased(self) -> Drawn:
+        """The same with smooth edges."""
+        return self._with(smoothed(self.pixels)) if self._is_fine and is_jagged(self.pixels) else self
+
+    @property
+    def _is_fine(self) -> bool:
+        """Whether ringing and steps are seen where shapes are looked for."""
+        return self.picture.width * self.picture.height <= FINEST**2
+
+    def _with(self, pixels: Float32Array) -> Drawn:
+        off = float(np.mean((pixels - self.picture.premultiplied) ** 2))
+        return replace(self, pixels=pixels, off=off)
 
     def flattened(self, picture: Picture) -> Drawn:
         """The same without its gradients."""
@@ -64,15 +75,14 @@ class Drawn:
         if target_psnr is None:
             return self.pixels, UNSURE * self.off
         allowed: float = 10 ** (-target_psnr / 10)
-        return (
-            (self.pixels, allowed - self.off) if allowed > self.off else (self.picture.premultiplied, allowed)
-        )
+        if allowed > self.off:
+            return self.pixels, allowed - self.off
+        return self.picture.premultiplied, allowed
 
 
 def flatness(pixels: np.ndarray, levels: float = ALIKE) -> float:
     """The share of pixels [H, W, C] that have the colour of their neighbours, about."""
-    across = np.abs(np.diff(pixels, axis=1)).max(axis=2, initial=0.0) <= levels
-    down = np.abs(np.diff(pixels, axis=0)).max(axis=2, initial=0.0) <= levels
+    across, down = alike(pixels[:, 1:], pixels[:, :-1], levels), alike(pixels[1:], pixels[:-1], levels)
     return min(share(across), share(down))
 
 

@@ -23,7 +23,7 @@ def is_jagged(pixels: Float32Array) -> bool:
     """Whether most corners of the edges of a picture [H, W, C] are steps of slopes and curves: where it is antialiased
     there are pixels between, and pixel art has other corners.
     """
-    edges = [~_alike(pixels[1:], pixels[:-1]), ~_alike(pixels[:, 1:], pixels[:, :-1])]
+    edges = [~alike(pixels[1:], pixels[:-1]), ~alike(pixels[:, 1:], pixels[:, :-1])]
     corners = int(((edges[0][:, 1:] ^ edges[0][:, :-1]) & (edges[1][1:] ^ edges[1][:-1])).sum())
     turned = np.swapaxes(pixels, 0, 1)
     runs = (_Runs.below(each) for each in (pixels, pixels[::-1], turned, turned[::-1]))
@@ -67,10 +67,10 @@ class _Runs:
         """Those of a picture [H, W, C]."""
         padded = np.pad(pixels, ((1, 0), (1, 1), (0, 0)), constant_values=np.inf)  # beyond, nothing is alike
         with np.errstate(invalid="ignore"):
-            beside, under = _alike(padded[:, :-1], padded[:, 1:]), _alike(padded[:-1], padded[1:])
+            beside, under = alike(padded[:, :-1], padded[:, 1:]), alike(padded[:-1], padded[1:])
             edge = ~under[1:] & np.isfinite(padded[1:-1]).all(axis=2)
-            rising = _alike(padded[1:-1, :-1], padded[2:, 1:])  # from a pixel to that below and after it
-            falling = _alike(padded[1:-1, 1:], padded[2:, :-1])
+            rising = alike(padded[1:-1, :-1], padded[2:, 1:])  # from a pixel to that below and after it
+            falling = alike(padded[1:-1, 1:], padded[2:, :-1])
         goes_on = edge[:, :-1] & edge[:, 1:] & beside[1:-1] & beside[2:]
         starts = edge & ~np.pad(goes_on, ((0, 0), (1, 0)))
         row, first = np.nonzero(starts)
@@ -104,12 +104,12 @@ class _Runs:
             yield self.row[index][chosen], (self.first[index] + along)[chosen], share
 
 
-def _alike(one: np.ndarray, other: np.ndarray) -> BoolArray:
-    """Which pixels have one colour."""
-    alike = np.ones(one.shape[:-1], bool)
+def alike(one: np.ndarray, other: np.ndarray, limit: float | Float32Array = ALIKE) -> BoolArray:
+    """Which pixels differ by no more than a limit, of all or each, in any channel."""
+    found = np.ones(one.shape[:-1], bool)
     for channel in range(one.shape[-1]):  # a reduction over the last axis takes five times as long
-        alike &= np.abs(one[..., channel] - other[..., channel]) <= ALIKE
-    return alike
+        found &= np.abs(one[..., channel] - other[..., channel]) <= limit
+    return found
 
 
 def _triangle(place: np.ndarray, length: np.ndarray) -> Float32Array:

@@ -14,7 +14,8 @@ from collections.abc import Iterator
 import numpy as np
 from scipy.ndimage import convolve1d, maximum_filter, minimum_filter, uniform_filter
 
-from ..arrays import BoolArray, Float32Array, Float64Array
+from ..arrays import Float32Array, Float64Array
+from .jagged import alike
 
 SEEN, SMALL = 1.5 / 255, 20 / 255  # what differs from one pixel to the next; up to which it may be ringing
 RINGING = 0.06  # of the differences, from which share on they go up and down, of what has been compressed
@@ -99,7 +100,7 @@ def _evened(colors: Float32Array) -> Float32Array:
     for _ in range(PASSES):
         total, count = np.zeros_like(colors), np.zeros((*limit.shape, 1), np.float32)
         for beside in _around(colors):
-            near = _within(beside, colors, limit)[..., None]
+            near = alike(beside, colors, limit)[..., None]
             total += near * beside
             count += near
         colors = (total / count).astype(np.float32)
@@ -113,11 +114,3 @@ def _around(colors: Float32Array) -> Iterator[Float32Array]:
     for down in range(2 * AROUND + 1):
         for across in range(2 * AROUND + 1):
             yield padded[down : down + height, across : across + width]
-
-
-def _within(one: Float32Array, other: Float32Array, limit: Float32Array) -> BoolArray:
-    """Which pixels differ by no more than a limit [H, W] in any channel."""
-    within = np.ones(limit.shape, bool)
-    for channel in range(one.shape[-1]):  # a reduction over the last axis takes longer
-        within &= np.abs(one[..., channel] - other[..., channel]) <= limit
-    return within

@@ -1,16 +1,13 @@
 """Pictures of 96 × 96 pixels drawn in numpy, by sixteen samples each: no renderer of this program has a part in it."""
 
-import io
-
 import numpy as np
 import torch
-from PIL import Image
 
 from sdf2vec.fit.initialization import Layers
 from sdf2vec.fit.joining import Search
 from sdf2vec.fit.shading import Shading
 from sdf2vec.fit.surroundings import View
-from sdf2vec.image import Picture, load, resize
+from sdf2vec.image import Picture, resize
 from sdf2vec.scene import Layer, Shape
 
 WHITE, BLUE, RED, GREEN = (
@@ -95,10 +92,3 @@ def noise():
     """Nothing that a few shapes could be."""
     coarse = np.random.default_rng(0).random((8, 12, 3), dtype=np.float32)
     return Picture(np.ascontiguousarray(resize(coarse, 48, 32)))
-
-
-def compressed(pixels, quality, **options):
-    """Opaque pixels as a JPEG gives them back, with colour at half the resolution if nothing else is said."""
-    file = io.BytesIO()
-    Image.fromarray(np.rint(pixels * 255).astype(np.uint8)).save(file, "JPEG", quality=quality, **options)
-    return load(file.getvalue()).pixels

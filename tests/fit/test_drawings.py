@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from skimage import data
 
+from sdf2vec.bench.known_drawing import compressed
 from sdf2vec.fit.drawings import (
     FLAT,
     SMOOTH,
@@ -14,7 +15,7 @@ from sdf2vec.fit.drawings import (
     smoothness,
 )
 from sdf2vec.image import Picture, load
-from tests.fit.drawn import BLUE, GREEN, RED, compressed, disc, noise, painted
+from tests.fit.drawn import BLUE, GREEN, RED, disc, noise, painted
 
 
 @pytest.mark.parametrize("name", ["rocket", "camera", "brick"])
@@ -56,7 +57,7 @@ def scene_drawn():
 def test_a_compressed_drawing_is_one(quality):
     """However little of it is still flat; what was drawn is nearer to the drawing than the file is."""
     picture = scene_drawn()
-    given = compressed(picture, quality)
+    given = compressed(picture, quality=quality)
     drawn = Drawn.of(Picture(given))
     assert drawn.flat
     assert not is_photograph(drawn)
@@ -66,7 +67,7 @@ def test_a_compressed_drawing_is_one(quality):
 
 def test_a_target_that_the_noise_leaves_room_for_counts_against_the_file():
     """What the file is off takes its part; where that is all the noise is looked for."""
-    drawn = Drawn.of(Picture(compressed(scene_drawn(), 75)))
+    drawn = Drawn.of(Picture(compressed(scene_drawn(), quality=75)))
     assert drawn.wanted(None) == (drawn.pixels, UNSURE * drawn.off)
     near = -10 * np.log10(drawn.off)
     pixels, allowed = drawn.wanted(near - 1.0)
