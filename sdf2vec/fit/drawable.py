@@ -23,6 +23,7 @@ from ..units import COLOR, FALLOFF, OPACITY, POSITION
 from .presets import MSE, Phase
 from .runs import Softening
 from .settling import GOING_ON, PHASES, Kept, Settling, Views, descend
+from .surroundings import error_of
 
 HARDLY = 0.45  # pixels: an edge of a smaller standard deviation is drawn sharp
 # Pixels, of the narrowest blurs. Of those from 1 on renderers make about the same. On the CPU Chromium draws the first
@@ -54,7 +55,8 @@ def rounded(scene: Scene, grain: Grain) -> Drawable:
 
 
 def drawable(scene: Scene, views: Views, grain: Grain, coarser: Scene | None = None) -> Drawable:
-    """The same, as near to a picture, which is given at any resolution, as it comes by descending meanwhile.
+    """The same, as near to a picture, which is given at any resolution, as it comes by descending meanwhile: of what is
+    near to it already descending may lose more than rounding alone.
 
     `coarser`: what came of the scene for a coarser drawing. Going on from it ends nearer, and takes half the time.
     """
@@ -64,7 +66,11 @@ def drawable(scene: Scene, views: Views, grain: Grain, coarser: Scene | None = N
     if softening:
         phases = _blur(tensors, softening, views, scene)
     descend(tensors, settling, views, scene, frozen=(FALLOFF.name,), phases=phases, softening=softening)
-    return _ended(tensors, scene, softening)
+    made = _ended(tensors, scene, softening)
+    if softening:
+        return made
+    view = views(phases[-1].resolution)
+    return min(made, rounded(scene, grain), key=lambda each: error_of(from_scene(each.scene), view))
 
 
 def blurred(scene: Scene, views: Views, grain: Grain) -> Drawable:
