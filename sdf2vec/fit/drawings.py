@@ -15,7 +15,8 @@ from .ringing import has_ringing, restored
 from .views import scaled
 
 FINEST = 1280  # pixels squared, beyond which neither steps nor ringing are seen where shapes are looked for
-UNSURE = 0.5  # of the squares of what is changed so much is still wrong, at most
+# of the squares of what is changed so much is still wrong, at most: of steps, where the edge is in its pixels; of noise
+UNSURE, UNSURE_OF_NOISE = 0.5, 0.2
 STEADY = 1.5 / 255  # by which pixels of one flat colour differ at most in a drawing: photographs have noise
 FLAT = 0.6  # share of pixels next to the same colour, of a drawing in flat colours
 PHOTOGRAPH, STILL_FLAT = 128, 0.58  # pixels squared, and how flat a drawing is there
@@ -30,13 +31,15 @@ DISC_RESOLUTION = 48
 @dataclass(frozen=True, eq=False)
 class Drawn:
     """A picture and the premultiplied pixels [H, W, C] that were drawn: its own, or those without what a file or a want
-    of antialiasing made of them; whether they are flat colours but for edges, and the mean squared error between.
+    of antialiasing made of them; whether they are flat colours but for edges, the mean squared error between, and that
+    which they leave unsure.
     """
 
     picture: Picture
     pixels: Float32Array
     flat: bool
     off: float = 0.0
+    unsure: float = 0.0
 
     @classmethod
     def of(cls, picture: Picture) -> Drawn:
@@ -46,22 +49,26 @@ class Drawn:
         if found._is_fine and has_ringing(pixels):
             clean = restored(pixels)
             if _small_flatness(clean) >= CLEAN:
-                return replace(found._with(clean), flat=True)
+                return replace(found._with(clean, UNSURE_OF_NOISE), flat=True)
         return found
 
     @property
     def antialiased(self) -> Drawn:
         """The same with smooth edges."""
-        return self._with(smoothed(self.pixels)) if self._is_fine and is_jagged(self.pixels) else self
+        if self._is_fine and is_jagged(self.pixels):
+            return self._with(smoothed(self.pixels), UNSURE)
+        return self
 
     @property
     def _is_fine(self) -> bool:
         """Whether ringing and steps are seen where shapes are looked for."""
         return self.picture.width * self.picture.height <= FINEST**2
 
-    def _with(self, pixels: Float32Array) -> Drawn:
+    def _with(self, pixels: Float32Array, share: float) -> Drawn:
+        """With other pixels, of which a share of the squares of what that changes is unsure."""
         off = float(np.mean((pixels - self.picture.premultiplied) ** 2))
-        return replace(self, pixels=pixels, off=off)
+        unsure = self.unsure + share * float(np.mean((pixels - self.pixels) ** 2))
+        return replace(self, pixels=pixels, off=off, unsure=unsure)
 
     def flattened(self, picture: Picture) -> Drawn:
         """The same without its gradients."""
@@ -73,7 +80,7 @@ class Drawn:
         meets that.
         """
         if target_psnr is None:
-            return self.pixels, UNSURE * self.off
+            return self.pixels, self.unsure
         allowed: float = 10 ** (-target_psnr / 10)
         if allowed > self.off:
             return self.pixels, allowed - self.off
