@@ -59,6 +59,15 @@ def test_colour_that_runs_over_an_edge_of_lightness_goes_back():
     assert error(made, picture) < 0.25 * error(given, picture)
 
 
+def test_what_goes_up_and_down_beside_an_edge_is_evened():
+    """By hand, in grey: four levels to both sides of an edge of 150."""
+    picture = np.where(np.arange(32)[None, :, None] < 16, 200.0, 50.0) / 255 * np.ones((24, 1, 3))
+    waves = np.where(np.arange(32) % 2, 4.0, -4.0) / 255 * (np.abs(np.arange(32) - 15.5) < 4)
+    given = (picture + waves[None, :, None]).astype(np.float32)
+    assert has_ringing(given)
+    assert np.abs(restored(given) - picture).max() < 1.5 / 255
+
+
 def test_what_differs_little_from_what_is_beside_it_stays_where_nothing_else_is():
     """Two levels: no noise, as there is no edge that it could come from."""
     picture = np.full((30, 30, 3), 0.5, np.float32)
