@@ -52,5 +52,8 @@ BENCHES: dict[str, Bench] = {
     ),
     "speed": Bench("speed", "a step of a fit against dense torch, time per pixel, and how a step grows"),
     "svg": Bench("svg", "how near the SVG of a fit comes to its render in every renderer, and its bytes"),
+    "targets": Bench(
+        "targets", "how many shapes and bytes a FLIP takes, beside the thesis' method and other programs"
+    ),
     "thesis": Bench("thesis", "the thesis' tables again: as printed, its method here, and ours"),
 }

@@ -21,6 +21,7 @@ if TYPE_CHECKING:
 
 measured: Callable[..., tuple[Fitted, Scene]] = deferred("sdf2vec.bench.fits", "measured")
 
+PICTURE = "woman_darkhair"  # whose FLIP is printed
 COLUMNS = (
     ("circle", 1),
     ("displaced", 1),

@@ -60,6 +60,7 @@ FAR = 10**-2.5  # 25 dB, of what is not yet the picture
 DOMINANT = 0.15  # share of the most common colour, of a picture that has a ground
 # times the shapes found that are fitted where these alone are not the drawing; then, as many as allowed
 MORE = 2, 4, 12
+COARSER = 1.5  # times the error, step by step, that fewer shapes may have where FLIP is wanted
 CLEARLY = 0.97  # of the description before, at most, that more shapes come to: they take more in a file
 
 
@@ -132,7 +133,10 @@ def _few(picture: Picture, settings: Settings, callback: Callback) -> Fitted | N
     if found is None:
         return None
     drawing = Drawing(drawn, settings, callback)
-    return _told(drawing.finished(repainted(found.scene, shading, ground)), picture, settings)
+    scene = drawing.finished(repainted(found.scene, shading, ground))
+    if _has_target(settings):
+        return _needed(drawing, scene, callback)
+    return _told(scene, picture, settings)
 
 
 def _searched(drawn: Drawn, settings: Settings, callback: Callback) -> Fitted | None:
@@ -142,24 +146,27 @@ def _searched(drawn: Drawn, settings: Settings, callback: Callback) -> Fitted | 
     if drawing.stopped:
         return _told(found, picture, settings)
     if settings.shapes == AUTO:
-        if drawing.gave_up:
-            return None
-        if drawing.error <= drawing.good and (
-            settings.target_psnr is None or missed(found, picture, settings) <= 0
-        ):
-            return Fitted(found, _counted(found))
-        if settings.target_psnr is None:
-            enough = _enough(picture, settings, found, drawing.sizes.last, callback)
-            return Fitted(enough, _counted(enough))
+        return None if drawing.gave_up else _needed(drawing, found, callback)
     going_on = _going_on(settings, found)
-    if settings.shapes == AUTO:
-        made = [meeting(picture, going_on, callback)[0]]
-    else:
-        anew = [settings] if _is_some(settings) and found.layers and drawing.error > drawing.good else []
-        made = [fit_concisely(picture, each, callback) for each in (going_on, *anew)]
-    if settings.shapes == AUTO or (settings.shapes == found.shape_count and settings.loss is None):
+    anew = [settings] if _is_some(settings) and found.layers and drawing.error > drawing.good else []
+    made = [fit_concisely(picture, each, callback) for each in (going_on, *anew)]
+    if settings.shapes == found.shape_count and settings.loss is None:
         made.append(found)
     return _told(_nearest(made, picture), picture, settings)
+
+
+def _needed(drawing: Drawing, found: Scene, callback: Callback) -> Fitted:
+    """What was found, or what goes on from it where that is not the drawing, or not as near as wanted."""
+    picture, settings = drawing.picture, drawing.settings
+    if not _has_target(settings):
+        if drawing.error > drawing.good:
+            found = _enough(picture, settings, found, drawing.sizes.last, callback)
+        return Fitted(found, _counted(found))
+    if missed(found, picture, settings) <= 0:
+        return Fitted(found, f"{_counted(found)}: {wanted(settings)} is reached")
+    scene, _ = meeting(picture, _going_on(settings, found), callback)
+    nearest = min((scene, found), key=partial(missed, picture=picture, settings=settings))
+    return _told(nearest, picture, settings)
 
 
 def _ground_shade(shading: Shading, settings: Settings) -> Shade | None:
@@ -210,7 +217,7 @@ def _told(scene: Scene, picture: Picture, settings: Settings) -> Fitted:
     """A scene with what there is to say of it."""
     if settings.shapes != AUTO:
         return Fitted(scene)
-    if settings.target_psnr is None:
+    if not _has_target(settings):
         return Fitted(scene, _counted(scene))
     met = missed(scene, picture, settings) <= 0
     return Fitted(scene, f"{_counted(scene)}: {wanted(settings)} is {'' if met else 'not '}reached", met)
@@ -222,7 +229,7 @@ def _may_be_few(settings: Settings) -> bool:
     more = settings.palette or settings.colors or settings.cuts or settings.trials
     most = SOME if preset_of(settings).searches else FEW
     few = settings.shapes == AUTO or settings.shapes <= most
-    return plain and few and not more and bool(settings.drawn_kinds) and settings.target_flip is None
+    return plain and few and not more and bool(settings.drawn_kinds)
 
 
 def _is_searched(drawn: Drawn, settings: Settings) -> bool:
@@ -277,10 +284,10 @@ class Drawing:
                     break
                 self.scene = made.scene
                 helped.append(made)
-                if self._are_slow(helped[-LAST_ROUNDS:], outlined):
+                if self._has_met(self.scene) or self._are_slow(helped[-LAST_ROUNDS:], outlined):
                     break
             if not self.gave_up:
-                self._finish()
+                self._finish_as_wanted()
         except Stopped:
             self.stopped = True
         self.error = error_of(self.scene, self.sizes.last)
@@ -294,7 +301,39 @@ class Drawing:
         return concise(self._made(), self.picture, self.settings)
 
     def _made(self) -> Scene:
-        return to_scene(self.scene, self.picture.width, self.picture.height)
+        return self._scene_of(self.scene)
+
+    def _scene_of(self, tensors: SceneTensors) -> Scene:
+        return to_scene(tensors, self.picture.width, self.picture.height)
+
+    def _has_met(self, scene: SceneTensors) -> bool:
+        """Whether a scene comes as near by FLIP as is wanted."""
+        if self.settings.target_flip is None:
+            return False
+        return missed(self._scene_of(scene), self.picture, self.settings) <= 0
+
+    def _finish_as_wanted(self) -> None:
+        """Finishes the scene. A FLIP that it has reached is kept, by no more layers than that takes."""
+        reached = self.scene if self._has_met(self.scene) else None
+        self._finish()
+        if self._has_met(self.scene):
+            self.scene = self._fewest(self.scene)
+        elif reached:
+            self.scene = reached
+
+    def _fewest(self, scene: SceneTensors) -> SceneTensors:
+        """The scene without layers that the FLIP that is wanted does not ask for: ever more error is allowed."""
+        worst = max(self.floor, error_of(scene, self.sizes.joint))
+        while scene.layer_count and worst < 1.0:
+            worst *= COARSER
+            fewer = pruned(scene, self.sizes, self.search, worst)
+            if fewer.layer_count == scene.layer_count:
+                continue
+            fewer = finished(fewer, self.sizes, self.search)
+            if not self._has_met(fewer):
+                break
+            scene = fewer
+        return scene
 
     def _finish(self) -> None:
         worst, sizes, search = self.worst, self.sizes, self.search

@@ -245,10 +245,12 @@ def _even(pixels: Float32Array) -> BoolArray:
 
 
 def _shade(x: Float32Array, y: Float32Array, colors: Float32Array) -> Shade | None:
-    """The plane through colours [P, C], where they are one, and no paler here than there."""
+    """The plane through colours [P, C] that changes along one direction, where they are one, and no paler here than
+    there.
+    """
     places = np.stack([x, y], axis=1)
     middle, mean = places.mean(axis=0), colors.mean(axis=0)
-    slopes: Float32Array = np.linalg.lstsq(places - middle, colors - mean)[0]
+    slopes = _along_one(np.linalg.lstsq(places - middle, colors - mean)[0])
     change = (places - middle) @ slopes
     changes = float(np.ptp(change, axis=0).max())
     if np.mean(np.abs(mean + change - colors).max(axis=1) <= max(PLANE, BENDS * changes)) < NEARLY:
@@ -257,3 +259,10 @@ def _shade(x: Float32Array, y: Float32Array, colors: Float32Array) -> Shade | No
         return Shade(middle, np.median(colors, axis=0), np.zeros_like(slopes))
     fades = colors.shape[1] == 4 and np.ptp(colors[:, 3]) > CHANGES
     return None if fades or len(colors) < LEAST_SHADED else Shade(middle, mean, slopes)
+
+
+def _along_one(slopes: Float32Array) -> Float32Array:
+    """Slopes [2, C] as near to these as change along one direction."""
+    left, strengths, right = np.linalg.svd(slopes, full_matrices=False)
+    found: Float32Array = left[:, :1] * strengths[0] @ right[:1]
+    return found

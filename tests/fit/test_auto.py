@@ -266,6 +266,31 @@ def test_a_target_is_met_by_fewer_shapes():
     assert "PSNR" in found.reason
 
 
+def test_a_flip_is_met_by_the_shapes_of_a_drawing(drawn):
+    """Not by those of a painting; and by no more than it takes: what is all but hidden is left out."""
+    picture = drawn(WHITE + UNDER + OVER + TRIANGLE)
+    near, far = (fitted(picture, target_flip=wanted) for wanted in (0.02, 0.2))
+    assert near.met
+    assert far.met
+    assert "FLIP" in near.reason
+    assert far.scene.shape_count < near.scene.shape_count == 3
+    assert quality(near.scene, picture).flip <= 0.02
+    assert 0.02 < quality(far.scene, picture).flip <= 0.2
+
+
+def test_a_target_that_gradients_do_not_reach_is_gone_on_for():
+    """The linear paint, which is all but a shape's, says a gradient of three colours to no more than some dB."""
+    x = np.linspace(-1.0, 1.0, 64, dtype=np.float32)[None, :, None] * np.ones((48, 1, 1), np.float32)
+    rises, bends = np.array([0.3, 0.3, -0.3], np.float32), np.array([0.0, 0.03, 0.0], np.float32)
+    picture = Picture((np.float32(0.5) + x * rises + (1 - np.abs(x)) * bends).astype(np.float32))
+    without = fitted(picture)
+    assert without.scene.shape_count == 1
+    psnr = quality(without.scene, picture).psnr
+    found = fitted(picture, target_psnr=psnr + 3, max_shapes=32, preset="fast")
+    assert found.met
+    assert found.scene.shape_count > 1
+
+
 @pytest.mark.parametrize("target", [{"target_psnr": 90.0}, {"target_flip": 0.001}])
 def test_a_target_out_of_reach_is_said(target):
     found = fitted(noise(), max_shapes=8, preset="fast", **target)

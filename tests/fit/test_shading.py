@@ -85,6 +85,12 @@ def round_gradient():
     return np.where(np.hypot(x - 48, y - 48)[..., None] < 36, GREEN + share[..., None] * RISE, WHITE)
 
 
+def both_ways():
+    """Red rises from the left to the right, blue from the top to the bottom: no two colours run into each other so."""
+    y, x = np.mgrid[0:SIDE, 0:SIDE] / SIDE
+    return np.where((np.abs(x - 0.5) < 0.4)[..., None], np.stack([x, 0.3 + 0 * x, y], axis=2), WHITE)
+
+
 def fading():
     """Green that is opaque on the left, and less to the right."""
     alpha = np.broadcast_to(np.linspace(1.0, 0.4, SIDE)[None, :, None], (SIDE, SIDE, 1))
@@ -98,6 +104,7 @@ def fading():
         soft(),
         soft_gradient(),
         round_gradient(),
+        both_ways(),
         fading(),
         np.random.default_rng(0).random((SIDE, SIDE, 3)),
         np.zeros((1, 300, 3)),
@@ -108,6 +115,7 @@ def fading():
         "a soft edge",
         "a gradient with one",
         "a round one",
+        "one for each of two channels",
         "fading",
         "noise",
         "one row",
