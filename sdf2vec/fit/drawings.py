@@ -21,6 +21,7 @@ STEADY = 1.5 / 255  # by which pixels of one flat colour differ at most in a dra
 FLAT = 0.6  # share of pixels next to the same colour, of a drawing in flat colours
 PHOTOGRAPH, STILL_FLAT = 128, 0.58  # pixels squared, and how flat a drawing is there
 CLEAN = 0.76  # the same where ringing has been taken away, as it has from photographs, too
+QUICK, UNCLEAN = 256, 0.5  # pixels squared, up to which it is looked for in any picture; beyond, in what is so flat
 DISCS = 24  # of a soft drawing so many discs leave at most
 LEFT = 0.15  # this share of its variance,
 LITTLE_LEFT = 0.08  # or this, where it is as rough as photographs are
@@ -46,11 +47,17 @@ class Drawn:
         """What was drawn of a picture, with its edges in steps."""
         pixels = picture.premultiplied
         found = cls(picture, pixels, flatness(pixels, STEADY) >= FLAT)
-        if found._is_fine and has_ringing(pixels):
+        if found._may_ring and has_ringing(pixels):
             clean = restored(pixels)
             if _small_flatness(clean) >= CLEAN:
                 return replace(found._with(clean, UNSURE_OF_NOISE), flat=True)
         return found
+
+    @property
+    def _may_ring(self) -> bool:
+        """Whether it is worth the time to look for ringing: of photographs seldom."""
+        quick = self.picture.width * self.picture.height <= QUICK**2
+        return self._is_fine and (quick or _small_flatness(self.pixels) >= UNCLEAN)
 
     @property
     def antialiased(self) -> Drawn:

@@ -33,8 +33,8 @@ from .views import scaled
 Views = Callable[[float], View]  # a picture at any resolution
 Kept = Mapping[Slot, torch.Tensor]  # numbers [G, width] that stay where they are; NaN for what does not yet
 PHASES = (
-    Phase("settling", 100, 256, rate=0.15, end_rate=0.09, loss=MSE),
-    Phase("settling", 100, 320, rate=0.09, end_rate=0.04, loss=MSE),
+    Phase("settling", 100, 256, rate=0.075, end_rate=0.045, loss=MSE),
+    Phase("settling", 100, 320, rate=0.045, end_rate=0.02, loss=MSE),
 )
 GOING_ON = PHASES[1:]  # from what has settled more coarsely
 SOLVED = 700  # numbers of layers, at most, that settle by least squares

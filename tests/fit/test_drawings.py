@@ -5,6 +5,7 @@ import pytest
 from skimage import data
 
 from sdf2vec.bench.known_drawing import compressed
+from sdf2vec.fit import drawings
 from sdf2vec.fit.drawings import (
     FLAT,
     SMOOTH,
@@ -63,6 +64,17 @@ def test_a_compressed_drawing_is_one(quality):
     assert not is_photograph(drawn)
     assert drawn.off == pytest.approx(float(np.mean((drawn.pixels - given) ** 2)))
     assert np.mean((drawn.pixels - picture) ** 2) < UNSURE * np.mean((given - picture) ** 2)
+
+
+def test_ringing_is_not_looked_for_in_photographs(monkeypatch):
+    """It takes long where they are large; a large drawing is flat enough for it to be worth that."""
+    monkeypatch.setattr(drawings, "has_ringing", lambda pixels: pytest.fail("looked for"))
+    photograph = load(data.coffee())
+    assert photograph.width * photograph.height > drawings.QUICK**2
+    assert not Drawn.of(photograph).flat
+    large = np.kron(scene_drawn(), np.ones((4, 4, 1), np.float32))
+    with pytest.raises(pytest.fail.Exception):
+        Drawn.of(Picture(compressed(large, quality=75)))
 
 
 def test_a_target_that_the_noise_leaves_room_for_counts_against_the_file():
