@@ -21,10 +21,8 @@ STEADY = 1.5 / 255  # by which pixels of one flat colour differ at most in a dra
 FLAT = 0.6  # share of pixels next to the same colour, of a drawing in flat colours
 PHOTOGRAPH, STILL_FLAT = 128, 0.58  # pixels squared, and how flat a drawing is there
 CLEAN = 0.76  # the same where ringing has been taken away, as it has from photographs, too
-QUICK, UNCLEAN = (
-    256,
-    0.5,
-)  # pixels squared, up to which it is looked for in any picture; beyond, in what is so flat
+QUICK = 256  # pixels squared of a picture in which ringing is looked for however flat it is;
+UNCLEAN = 0.5  # the same of larger ones, where it is
 DISCS = 24  # of a soft drawing so many discs leave at most
 LEFT = 0.15  # this share of its variance,
 LITTLE_LEFT = 0.08  # or this, where it is as rough as photographs are
