@@ -30,7 +30,7 @@ if TYPE_CHECKING:
 HARDLY, LITTLE = 0.2, 0.5  # dB that a small drawing may lose of the picture: a coarse one, a finer one
 LIKE_RENDER_ERROR = 10**-4.2  # mean squared, of what is 42 dB from the render
 SAME = 99.0  # dB of what is the same
-WORTH = 1.0  # dB that twice the bytes gzipped are to bring
+WORTH = 1.5  # dB that twice the bytes, as they are and gzipped, are to bring: about what twice the shapes do
 MOST_LOST = 5.0  # dB of the picture that are lost for fewer bytes, at most
 LARGER = 0.7  # of a size limit: where the finest small drawing takes more, others take too much
 SURE = (
@@ -171,9 +171,7 @@ class Exports:
         else:
             like = exporter.from_finest(scene, options)[0]()
             gained = lost - self._lost_by(scene, scene, LIKE_RENDER_ERROR)
-            if lost > MOST_LOST or gained >= WORTH * math.log2(
-                gzipped_size(like.raw) / gzipped_size(made.raw)
-            ):
+            if lost > MOST_LOST or gained >= WORTH * _doublings(made.raw, like.raw):
                 return like
         note = f"{exporter.suffix[1:]}: drawn small, {self._told(scene, lost)}"
         return replace(made, notes=(note, *made.notes))
@@ -339,6 +337,12 @@ def _is_plain(scene: Scene) -> bool:
 def _mixes_colors(scene: Scene) -> bool:
     """Whether there are unions of several colours, which a drawing may not have the fill for."""
     return any(len({shape.color for shape in layer.seen}) > 1 for layer in scene.layers)
+
+
+def _doublings(small: bytes, large: bytes) -> float:
+    """How many times the bytes double from one text to another: the mean of what is kept and what is sent."""
+    plain, sent = len(large) / len(small), gzipped_size(large) / gzipped_size(small)
+    return 0.5 * math.log2(plain * sent)
 
 
 def _lost(decibels: float) -> str:
