@@ -5,8 +5,10 @@ from __future__ import annotations
 import argparse
 import io
 import math
+import re
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Collection, Iterator, Mapping
+from functools import cache
 from itertools import chain, product
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -17,11 +19,12 @@ from PIL import Image
 from .. import api
 from ..arrays import Float32Array
 from ..deferred import deferred
-from ..engines import ENGINES
+from ..engines import ENGINES, resvg
 from ..errors import Sdf2vecError
 from ..export.byte_limit import ByteLimit, gzipped_size
-from ..image import Picture, load
+from ..image import Picture, encode_png, load, premultiply
 from . import choices
+from .peers import PEERS, drawn_by, programs_of
 from .table import Asked, Page
 
 drawn: Callable[..., dict[str, Float32Array]] = deferred("sdf2vec.bench.fits", "drawn")
@@ -31,6 +34,11 @@ flip_of: Callable[[Float32Array, Picture], float] = deferred("sdf2vec.bench.fits
 TARGETS = {"svg": ("resvg", "chromium"), "shadertoy": ("opengl",), "glsl": ("opengl",), "godot": ("opengl",)}
 SIDES = (12, 16, 24, 32, 48, 64, 96, 128, 192, 256)  # pixels along the longer one of a thumbnail
 QUALITIES = (1, 5, 10, 20, 35, 50, 75)
+FEW, SPARE = (
+    16,
+    1.15,
+)  # shapes of another program, by which is told how many go into a limit; so many times as many
+SHAPE = re.compile(r"<(path|polygon|ellipse|circle|rect|line)\b")
 
 
 class Row(NamedTuple):
@@ -46,11 +54,16 @@ class Row(NamedTuple):
     psnr: float  # dB
     flip: float
     webp: float  # dB of the nearest WebP that is no larger
+    others: tuple[float, ...]  # the same of what other programs make
     seconds: float  # CPU
 
 
-def measured(path: Path, target: str, limit: str, **options: Any) -> Row:
-    """One fit within a limit, drawn by each engine of its target that most people see it with."""
+def measured(
+    path: Path, target: str, limit: str, beside: Mapping[str, str | None] | None = None, **options: Any
+) -> Row:
+    """One fit within a limit, drawn by each engine of its target that most people see it with; `beside`: other programs
+    and where they are.
+    """
     picture = load(path)
     started = time.process_time()
     share = api.share_of([target], max_bytes=limit)
@@ -71,6 +84,7 @@ def measured(path: Path, target: str, limit: str, **options: Any) -> Row:
         near[worst],
         flip_of(images[worst], picture),
         nearest_webp(picture, ByteLimit.of(limit).most),
+        tuple(nearest_of(name, where, path, limit) for name, where in (beside or {}).items()),
         seconds,
     )
 
@@ -105,22 +119,54 @@ def nearest_webp(picture: Picture, limit: int) -> float:
     return found
 
 
+@cache
+def nearest_of(name: str, where: str | None, path: Path, limit: str) -> float:
+    """The PSNR in dB of the SVG of a program that lays one shape on the other, as many as go into a limit."""
+    picture, most = load(path), ByteLimit.of(limit)
+    png, size = encode_png(picture.pixels), (picture.width, picture.height)
+    few, _ = drawn_by(name, png, size, FEW, where)
+    bare = most.size(_without_last(few, FEW).encode())
+    each = (most.size(few.encode()) - bare) / FEW
+    count = math.ceil(SPARE * max(most.most - bare, 0) / each) + 1
+    svg, _ = drawn_by(name, png, size, count, where)
+    while SHAPE.search(svg) and most.size(svg.encode()) > most.most:
+        svg = _without_last(svg, 1)
+    pixels = premultiply(resvg.render(svg, *size))
+    on_white = pixels[..., :3] + 1.0 - pixels[..., 3:]
+    return psnr(on_white, picture.pixels[..., :3])
+
+
+def _without_last(svg: str, count: int) -> str:
+    """An SVG with a shape in a line without so many of the last."""
+    lines = svg.splitlines(keepends=True)
+    gone = [index for index, line in enumerate(lines) if SHAPE.search(line)][-count:]
+    return "".join(line for index, line in enumerate(lines) if index not in gone)
+
+
 ABOUT = """Text as written with `--max-bytes` (`gz`: gzipped), drawn at the picture's size by resvg and Chromium, \
 whichever is worse, or by OpenGL; PSNR and FLIP against the picture. WebP: the nearest of several sizes and \
-qualities that is no larger than the limit, drawn large by bicubic interpolation."""
-HEAD = (
-    "| picture | target | limit | bytes | gzipped | used | shapes | engine | PSNR dB | FLIP | WebP dB | CPU s |",
-    "|---|---|---:|---:|---:|---:|---:|---|---:|---:|---:|---:|",
-)
+qualities that is no larger than the limit, drawn large by bicubic interpolation. Other programs: their SVG, \
+with as many shapes as go into the limit, drawn by resvg."""
+
+
+def head(beside: Collection[str]) -> Iterator[str]:
+    """Of the table."""
+    others = "".join(f" {name} dB |" for name in beside)
+    yield (
+        "| picture | target | limit | bytes | gzipped | used | shapes | engine | PSNR dB | FLIP | WebP dB "
+        f"|{others} CPU s |"
+    )
+    yield "|---|---|---:|---:|---:|---:|---:|---|---:|---:|---:|" + "---:|" * (len(beside) + 1)
 
 
 def line(row: Row) -> str:
     """A row of the table."""
     limit = ByteLimit.of(row.limit)
     used = (row.zipped if limit.gzipped else row.raw) / limit.most
+    others = "".join(f" {near:.2f} |" for near in row.others)
     return (
         f"| {row.picture} | {row.target} | {row.limit} | {row.raw:,} | {row.zipped:,} | {used:.0%} | {row.shapes} "
-        f"| {row.engine} | {row.psnr:.2f} | {row.flip:.4f} | {row.webp:.2f} | {row.seconds:.0f} |"
+        f"| {row.engine} | {row.psnr:.2f} | {row.flip:.4f} | {row.webp:.2f} |{others} {row.seconds:.0f} |"
     )
 
 
@@ -131,6 +177,15 @@ def add_choices(parser: argparse.ArgumentParser) -> None:
     choices.add_list(
         parser, "--targets", choices.names("target", TARGETS), "svg,shadertoy", "what is written"
     )
+    grown = [name for name, peer in PEERS.items() if peer.grows]
+    parser.add_argument(
+        "--beside",
+        type=choices.names("program", grown),
+        default=[],
+        metavar="LIST",
+        help=f"other programs, of {', '.join(grown)} (default: none)",
+    )
+    choices.add_peer(parser)
     choices.add_fit(parser, "max_shapes", "preset", "seed")
 
 
@@ -139,6 +194,8 @@ def pages(options: argparse.Namespace, asked: Asked) -> Iterator[Page]:
     fit = choices.fit_of(options)
     for target in options.targets:
         _engines(target)
+    programs = programs_of(options.peer)
+    beside = {name: programs.get(PEERS[name].programs[0]) for name in options.beside}
     asks = product(options.pictures, options.targets, options.limits)
-    rows = (line(measured(*ask, **fit)) for ask in asks)
-    yield asked.page("What so many bytes can say", ABOUT, asked.told(chain(HEAD, rows)))
+    rows = (line(measured(*ask, beside, **fit)) for ask in asks)
+    yield asked.page("What so many bytes can say", ABOUT, asked.told(chain(head(beside), rows)))

@@ -105,6 +105,13 @@ def add_count(parser: argparse.ArgumentParser, flag: str, default: int, about: s
     parser.add_argument(flag, type=count, default=default, metavar="N", help=f"{about} (default: {default})")
 
 
+def add_peer(parser: argparse.ArgumentParser) -> None:
+    """Where other programs are."""
+    parser.add_argument(
+        "--peer", action="append", default=[], metavar="NAME=PATH", help="where another program is"
+    )
+
+
 def add_fit(parser: argparse.ArgumentParser, *options: str) -> None:
     """Options of a fit, as `sdf2vec` itself has them."""
     for name in options:

@@ -69,9 +69,7 @@ def _add_comparison(parser: argparse.ArgumentParser) -> None:
         "--methods", default=",".join(USUAL), help=f"methods and groups of them (default: {','.join(USUAL)})"
     )
     choices.add_count(parser, "--repeat", 1, "so many seeds")
-    parser.add_argument(
-        "--peer", action="append", default=[], metavar="NAME=PATH", help="where another program is"
-    )
+    choices.add_peer(parser)
     parser.add_argument("--stability", action="store_true", help="run the catalogue of where methods fail")
     choices.add_count(parser, "--seeds", 20, "of the catalogue")
     parser.add_argument(

@@ -50,14 +50,16 @@ class Published(NamedTuple):
 class Peer:
     """A program: `programs` are the names it is found by; `command` calls it such that it writes an SVG.
 
-    `counts`: whether it is told a number of shapes. `mend`: what its SVG needs before a renderer takes it. `package`:
-    of Python, which does instead of a program.
+    `counts`: whether it is told a number of shapes; `grows`: whether it lays one on the other, a line of its SVG each,
+    so that what fewer would be is the same without the last ones. `mend`: what its SVG needs before a renderer takes
+    it. `package`: of Python, which does instead of a program.
     """
 
     about: str
     programs: tuple[str, ...]
     command: Callable[[Call], list[str]]
     counts: bool = True
+    grows: bool = False
     mend: Callable[[str, Call], str] = lambda svg, call: svg
     package: str = ""
 
@@ -126,9 +128,13 @@ FRUGAL: dict[str, int | str] = {
 }
 
 PEERS: dict[str, Peer] = {
-    "primitive": Peer("fogleman/primitive, triangles", ("primitive",), _primitive(1)),
-    "primitive-ellipse": Peer("fogleman/primitive, rotated ellipses", ("primitive",), _primitive(7)),
-    "geometrize": Peer("geometrizejs-cli, rotated ellipses", ("geometrize",), _geometrize, mend=_namespaced),
+    "primitive": Peer("fogleman/primitive, triangles", ("primitive",), _primitive(1), grows=True),
+    "primitive-ellipse": Peer(
+        "fogleman/primitive, rotated ellipses", ("primitive",), _primitive(7), grows=True
+    ),
+    "geometrize": Peer(
+        "geometrizejs-cli, rotated ellipses", ("geometrize",), _geometrize, grows=True, mend=_namespaced
+    ),
     "vtracer": Peer(
         "vtracer at its defaults, paths", ("vtracer",), _vtracer(), counts=False, package="vtracer"
     ),
@@ -143,19 +149,23 @@ PEERS: dict[str, Peer] = {
 }
 
 
-def drawn_by(name: str, png: bytes) -> tuple[str, float]:
-    """The SVG that a program which is told no number makes of a picture, and its CPU seconds.
+def drawn_by(
+    name: str, png: bytes, size: tuple[int, int] = (0, 0), shapes: int = 0, given: str | None = None
+) -> tuple[str, float]:
+    """The SVG that a program makes of a picture, and its CPU seconds; of what size that is and with how many shapes,
+    for one that is told that. `given`: where the program is.
 
     Raises Sdf2vecError where it is missing or fails.
     """
     peer = PEERS[name]
-    program = peer.found()
+    program = peer.found(given)
     if program is None:
-        raise Sdf2vecError(f"{name} is not here: pip install {peer.package}, or put its program on the path")
+        package = f"pip install {peer.package}, or " if peer.package else ""
+        raise Sdf2vecError(f"{name} is not here: {package}put its program on the path")
     with tempfile.TemporaryDirectory() as folder:
         source, target = Path(folder, "picture.png"), Path(folder, "picture.svg")
         source.write_bytes(png)
-        call = Call(program, str(source), str(target), (0, 0), 0)
+        call = Call(program, str(source), str(target), size, shapes)
         before = os.times()
         done = subprocess.run(peer.command(call), capture_output=True, text=True, check=False)
         after = os.times()

@@ -184,9 +184,7 @@ def add_choices(parser: argparse.ArgumentParser) -> None:
         "other methods, as of sdf2vec bench",
     )
     choices.add_shapes(parser, "16,32,64,128,256,512,1024,2048")
-    parser.add_argument(
-        "--peer", action="append", default=[], metavar="NAME=PATH", help="where another program is"
-    )
+    choices.add_peer(parser)
     choices.add_fit(parser, "max_shapes", "preset", "seed")
 
 
