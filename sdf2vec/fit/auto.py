@@ -16,6 +16,7 @@ from functools import partial
 import torch
 from msgspec import structs
 
+from ..arrays import Float32Array
 from ..image import Picture
 from ..paints import FLAT as ONE_COLOR
 from ..quality import psnr_of
@@ -48,6 +49,7 @@ from .views import scaled, view_of
 
 THOROUGHLY = 12  # layers, at most, which in the end are tried without even where they matter
 SEARCH, JOINT, LAST = 56, 128, 320  # pixels squared
+HARDLY_LARGER = 1.5  # times that, up to which a picture is looked at as it is
 FEW = 4  # shapes that are placed by trial, of any picture, also where their number is given
 SOME = 256  # shapes that are, of a drawing, where their number is given
 # of the error so much, 2 dB less, is left by so many rounds that no longer find much; from so many layers on
@@ -266,7 +268,7 @@ class Drawing:
         pixels, self.worst = drawn.wanted(settings.target_psnr)
         self.floor = self.worst if settings.target_psnr is not None else max(FLOOR, self.worst)
         self.good = self.floor if settings.target_psnr is not None else max(GOOD, self.worst)
-        self.sizes = Sizes(*(view_of(pixels, settings, r) for r in (SEARCH, JOINT, LAST)))
+        self.sizes = Sizes(*(looked_at(pixels, settings, r) for r in (SEARCH, JOINT, LAST)))
         self.scene = SceneTensors([], ground_of(self.sizes.joint.target), settings.compositing, self.size)
 
     def found(self) -> Scene:
@@ -395,6 +397,14 @@ class Drawing:
         steps = max(count + 1, self.settings.most)
         if self.callback(Progress(phase, count, steps, loss, self._made)):
             raise Stopped
+
+
+def looked_at(pixels: Float32Array, settings: Settings, resolution: int) -> View:
+    """A picture at a resolution, or as it is where it is hardly larger: scaled by so little, edges become softer than
+    any of a shape.
+    """
+    own = math.sqrt(pixels.shape[0] * pixels.shape[1])
+    return view_of(pixels, settings, own if own < HARDLY_LARGER * resolution else resolution)
 
 
 def ground_of(target: torch.Tensor) -> torch.Tensor:

@@ -498,3 +498,17 @@ def _hidden(count, level):
     grey = (level, level, level)
     disc = Layer((Shape("circle", (0.0, 0.0, 0.1), grey),))
     return Scene(64, 64, (disc,) * count, grey)
+
+
+@pytest.mark.parametrize("size", [(160, 120), (136, 136), (180, 100)])
+def test_what_is_hardly_larger_than_it_is_looked_at_is_not_scaled(size):
+    """Scaled by so little, edges were softer than any of a shape: a ring took two layers and half a minute."""
+    width, height = size
+    y, x = np.mgrid[0:height, 0:width] + 0.5
+    away = np.hypot(x - width / 2, y - height / 2)
+    cover = np.clip(45.5 - away, 0, 1) * np.clip(away - 29.5, 0, 1)
+    picture = Picture((1 - cover[..., None] * np.array([0.2, 0.8, 0.9])).astype(np.float32))
+    scene = fit(picture)
+    assert len(scene.layers) == 1
+    assert {shape.kind for shape in scene.layers[0].shapes} == {"circle"}
+    assert quality(scene, picture).psnr > 44
