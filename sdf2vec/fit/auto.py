@@ -25,7 +25,7 @@ from ..scene import Scene
 from ..threads import threads_of_its_own
 from .backends import CPU, choose
 from .byte_budget import Share, within
-from .descents import Sizes, finished, softer
+from .descents import Sizes, descended, finished, softer
 from .description import description_length
 from .digits import concise, fit_concisely
 from .drawings import Drawn, is_photograph
@@ -36,6 +36,7 @@ from .loop import Callback, Progress, Stopped
 from .mending import SLIGHTLY, exchanged, merged
 from .offers import common_color
 from .one_more import gain_of_one_more
+from .presets import Phase
 from .pruning import BRIEF, FLOOR, THOROUGH, USUAL, pruned
 from .ramps import KIND, grounded
 from .repainting import ground_shade, repainted
@@ -48,7 +49,8 @@ from .targets import meeting, missed, wanted
 from .views import scaled, view_of
 
 THOROUGHLY = 12  # layers, at most, which in the end are tried without even where they matter
-SEARCH, JOINT, LAST = 56, 128, 320  # pixels squared
+SEARCH, JOINT, LAST, LARGEST = 56, 128, 320, 1024  # pixels squared
+SHARPENED = Phase("sharpened", 60, 0, rate=0.3, end_rate=0.02)
 HARDLY_LARGER = 1.5  # times that, up to which a picture is looked at as it is
 FEW = 4  # shapes that are placed by trial, of any picture, also where their number is given
 SOME = 256  # shapes that are, of a drawing, where their number is given
@@ -265,10 +267,10 @@ class Drawing:
         generator = torch.Generator().manual_seed(settings.seed)
         layers = Layers(settings.drawn_kinds, settings.compositing)
         self.search = Search(layers, preset_of(settings).falloff, generator, self._tick, pixel)
-        pixels, self.worst = drawn.wanted(settings.target_psnr)
+        self.pixels, self.worst = drawn.wanted(settings.target_psnr)
         self.floor = self.worst if settings.target_psnr is not None else max(FLOOR, self.worst)
         self.good = self.floor if settings.target_psnr is not None else max(GOOD, self.worst)
-        self.sizes = Sizes(*(looked_at(pixels, settings, r) for r in (SEARCH, JOINT, LAST)))
+        self.sizes = Sizes(*(looked_at(self.pixels, settings, r) for r in (SEARCH, JOINT, LAST)))
         self.scene = SceneTensors([], ground_of(self.sizes.joint.target), settings.compositing, self.size)
 
     def found(self) -> Scene:
@@ -290,6 +292,7 @@ class Drawing:
                     break
             if not self.gave_up:
                 self._finish_as_wanted()
+                self.scene = self._sharpened(self.scene)
         except Stopped:
             self.stopped = True
         self.error = error_of(self.scene, self.sizes.last)
@@ -300,6 +303,7 @@ class Drawing:
         self.scene = from_scene(scene)
         with suppress(Stopped):
             self.scene = finished(self.scene, self.sizes, self.search)
+            self.scene = self._sharpened(self.scene)
         return concise(self._made(), self.picture, self.settings)
 
     def _made(self) -> Scene:
@@ -351,6 +355,16 @@ class Drawing:
         self.scene = finished(self.scene, sizes, search)
         self.scene = self._briefer(self.floor)
         self.scene = sharing(self.scene, sizes.last, worst)
+
+    def _sharpened(self, scene: SceneTensors) -> SceneTensors:
+        """The scene after a descent at the picture's own size, where it is larger than it was looked at: edges are
+        sharper there.
+        """
+        if self.sizes.last.target.shape[1:] == (self.picture.height, self.picture.width):
+            return scene
+        view = looked_at(self.pixels, self.settings, LARGEST)
+        made = descended(scene, view, self.search, SHARPENED, simple=True)
+        return min(scene, made, key=partial(error_of, view=view))
 
     def _briefer(self, worst: float) -> SceneTensors:
         """The scene without what is needless now that all is simple, where it is told as shortly."""

@@ -512,3 +512,13 @@ def test_what_is_hardly_larger_than_it_is_looked_at_is_not_scaled(size):
     assert len(scene.layers) == 1
     assert {shape.kind for shape in scene.layers[0].shapes} == {"circle"}
     assert quality(scene, picture).psnr > 44
+
+
+def test_edges_of_a_large_drawing_are_sharp(drawn):
+    """However much smaller it is looked at: half a pixel's softness there is more than one of this picture."""
+    shapes = f'<svg width="1000" height="750" viewBox="0 0 96 72">{DISC}</svg>'
+    picture = drawn(WHITE + shapes, 1000, 750)
+    scene = fit(picture)
+    assert kinds_of(scene) == ["circle"]
+    assert scene.layers[0].falloff < 2.5 * scene.pixel
+    assert quality(scene, picture).psnr > 50
