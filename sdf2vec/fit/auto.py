@@ -140,7 +140,7 @@ def _few(picture: Picture, settings: Settings, callback: Callback) -> Fitted | N
     scene = drawing.finished(repainted(found.scene, shading, ground))
     if _has_target(settings):
         return _needed(drawing, scene, callback)
-    return _told(scene, picture, settings)
+    return _told(drawing.sharpened(scene), picture, settings)
 
 
 def _searched(drawn: Drawn, settings: Settings, callback: Callback) -> Fitted | None:
@@ -151,6 +151,7 @@ def _searched(drawn: Drawn, settings: Settings, callback: Callback) -> Fitted | 
         return _told(found, picture, settings)
     if settings.shapes == AUTO:
         return None if drawing.gave_up else _needed(drawing, found, callback)
+    found = drawing.sharpened(found)
     going_on = _going_on(settings, found)
     anew = [settings] if _is_some(settings) and found.layers and drawing.error > drawing.good else []
     made = [fit_concisely(picture, each, callback) for each in (going_on, *anew)]
@@ -162,9 +163,12 @@ def _searched(drawn: Drawn, settings: Settings, callback: Callback) -> Fitted | 
 def _needed(drawing: Drawing, found: Scene, callback: Callback) -> Fitted:
     """What was found, or what goes on from it where that is not the drawing, or not as near as wanted."""
     picture, settings = drawing.picture, drawing.settings
+    if not _has_target(settings) and drawing.error > drawing.good:
+        more = _enough(picture, settings, found, drawing.sizes.last, callback)
+        if more is not found:
+            return Fitted(more, _counted(more))
+    found = drawing.sharpened(found)
     if not _has_target(settings):
-        if drawing.error > drawing.good:
-            found = _enough(picture, settings, found, drawing.sizes.last, callback)
         return Fitted(found, _counted(found))
     if missed(found, picture, settings) <= 0:
         return Fitted(found, f"{_counted(found)}: {wanted(settings)} is reached")
@@ -292,7 +296,6 @@ class Drawing:
                     break
             if not self.gave_up:
                 self._finish_as_wanted()
-                self.scene = self._sharpened(self.scene)
         except Stopped:
             self.stopped = True
         self.error = error_of(self.scene, self.sizes.last)
@@ -303,8 +306,21 @@ class Drawing:
         self.scene = from_scene(scene)
         with suppress(Stopped):
             self.scene = finished(self.scene, self.sizes, self.search)
-            self.scene = self._sharpened(self.scene)
         return concise(self._made(), self.picture, self.settings)
+
+    def sharpened(self, scene: Scene) -> Scene:
+        """A scene after a descent at the picture's own size, where it is larger than it was looked at: edges are
+        sharper there. A FLIP that is reached is kept.
+        """
+        if self.sizes.last.target.shape[1:] == (self.picture.height, self.picture.width):
+            return scene
+        before, view = from_scene(scene), looked_at(self.pixels, self.settings, LARGEST)
+        with suppress(Stopped):
+            made = descended(before, view, self.search, SHARPENED, simple=True)
+            is_nearer = error_of(made, view) < error_of(before, view)
+            if is_nearer and (self._has_met(made) or not self._has_met(before)):
+                return concise(self._scene_of(made), self.picture, self.settings)
+        return scene
 
     def _made(self) -> Scene:
         return self._scene_of(self.scene)
@@ -355,16 +371,6 @@ class Drawing:
         self.scene = finished(self.scene, sizes, search)
         self.scene = self._briefer(self.floor)
         self.scene = sharing(self.scene, sizes.last, worst)
-
-    def _sharpened(self, scene: SceneTensors) -> SceneTensors:
-        """The scene after a descent at the picture's own size, where it is larger than it was looked at: edges are
-        sharper there.
-        """
-        if self.sizes.last.target.shape[1:] == (self.picture.height, self.picture.width):
-            return scene
-        view = looked_at(self.pixels, self.settings, LARGEST)
-        made = descended(scene, view, self.search, SHARPENED, simple=True)
-        return min(scene, made, key=partial(error_of, view=view))
 
     def _briefer(self, worst: float) -> SceneTensors:
         """The scene without what is needless now that all is simple, where it is told as shortly."""
