@@ -50,9 +50,7 @@ from .views import scaled, view_of
 
 THOROUGHLY = 12  # layers, at most, which in the end are tried without even where they matter
 SEARCH, JOINT, LAST, LARGEST = 56, 128, 320, 1024  # pixels squared
-SHARPENED = Phase(
-    "sharpened", 60, 0, rate=0.03, end_rate=0.003
-)  # steps that are large lose more than they bring
+SHARPENED = Phase("sharpened", 60, 0, rate=0.03, end_rate=0.003)  # larger steps lose more than they bring
 HARDLY_LARGER = 1.5  # times that, up to which a picture is looked at as it is
 FEW = 4  # shapes that are placed by trial, of any picture, also where their number is given
 SOME = 256  # shapes that are, of a drawing, where their number is given
