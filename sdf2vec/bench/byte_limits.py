@@ -22,9 +22,10 @@ from ..deferred import deferred
 from ..engines import ENGINES, resvg
 from ..errors import Sdf2vecError
 from ..export.byte_limit import ByteLimit, gzipped_size
-from ..image import Picture, encode_png, load, premultiply
+from ..image import Picture, encode_png, load
 from . import choices
-from .peers import PEERS, drawn_by, programs_of
+from .peers import PEERS, drawn_by, programs_of, required
+from .sheet import over_white
 from .table import Asked, Page
 
 drawn: Callable[..., dict[str, Float32Array]] = deferred("sdf2vec.bench.fits", "drawn")
@@ -34,10 +35,8 @@ flip_of: Callable[[Float32Array, Picture], float] = deferred("sdf2vec.bench.fits
 TARGETS = {"svg": ("resvg", "chromium"), "shadertoy": ("opengl",), "glsl": ("opengl",), "godot": ("opengl",)}
 SIDES = (12, 16, 24, 32, 48, 64, 96, 128, 192, 256)  # pixels along the longer one of a thumbnail
 QUALITIES = (1, 5, 10, 20, 35, 50, 75)
-FEW, SPARE = (
-    16,
-    1.15,
-)  # shapes of another program, by which is told how many go into a limit; so many times as many
+FEW = 16  # shapes of another program, by which is told how many go into a limit;
+SPARE = 1.15  # so many times as many are asked for
 SHAPE = re.compile(r"<(path|polygon|ellipse|circle|rect|line)\b")
 
 
@@ -59,7 +58,7 @@ class Row(NamedTuple):
 
 
 def measured(
-    path: Path, target: str, limit: str, beside: Mapping[str, str | None] | None = None, **options: Any
+    path: Path, target: str, limit: str, beside: Mapping[str, str] | None = None, **options: Any
 ) -> Row:
     """One fit within a limit, drawn by each engine of its target that most people see it with; `beside`: other programs
     and where they are.
@@ -120,7 +119,7 @@ def nearest_webp(picture: Picture, limit: int) -> float:
 
 
 @cache
-def nearest_of(name: str, where: str | None, path: Path, limit: str) -> float:
+def nearest_of(name: str, where: str, path: Path, limit: str) -> float:
     """The PSNR in dB of the SVG of a program that lays one shape on the other, as many as go into a limit."""
     picture, most = load(path), ByteLimit.of(limit)
     png, size = encode_png(picture.pixels), (picture.width, picture.height)
@@ -131,9 +130,7 @@ def nearest_of(name: str, where: str | None, path: Path, limit: str) -> float:
     svg, _ = drawn_by(name, png, size, count, where)
     while SHAPE.search(svg) and most.size(svg.encode()) > most.most:
         svg = _without_last(svg, 1)
-    pixels = premultiply(resvg.render(svg, *size))
-    on_white = pixels[..., :3] + 1.0 - pixels[..., 3:]
-    return psnr(on_white, picture.pixels[..., :3])
+    return psnr(over_white(resvg.render(svg, *size)), picture.pixels[..., :3])
 
 
 def _without_last(svg: str, count: int) -> str:
@@ -195,7 +192,7 @@ def pages(options: argparse.Namespace, asked: Asked) -> Iterator[Page]:
     for target in options.targets:
         _engines(target)
     programs = programs_of(options.peer)
-    beside = {name: programs.get(PEERS[name].programs[0]) for name in options.beside}
+    beside = {name: required(name, programs) for name in options.beside}
     asks = product(options.pictures, options.targets, options.limits)
     rows = (line(measured(*ask, beside, **fit)) for ask in asks)
     yield asked.page("What so many bytes can say", ABOUT, asked.told(chain(head(beside), rows)))

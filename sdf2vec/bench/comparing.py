@@ -73,8 +73,7 @@ def compare(plan: Plan, say: Callable[[str], None]) -> Results:
 
 
 def _program(plan: Plan, method: Method) -> str | None:
-    peer = method.peer
-    return peer.found(plan.programs.get(peer.programs[0])) if peer else None
+    return method.peer.among(plan.programs) if method.peer else None
 
 
 def _tasks(plan: Plan, pictures: dict[str, Picture]) -> Iterator[Task]:

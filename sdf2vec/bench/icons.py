@@ -27,6 +27,7 @@ from ..scene import Scene
 from . import choices
 from .peers import PEERS, drawn_by
 from .recovery import psnr
+from .sheet import over_white
 from .svg_shapes import count_numbers, parsed, shapes_of
 from .table import Asked, Page
 
@@ -65,11 +66,6 @@ def chosen(folder: Path, most: int) -> list[Path]:
     paths = sorted(folder.rglob("*.svg"))
     steps = np.linspace(0, len(paths) - 1, min(most, len(paths))).round().astype(int)
     return [paths[step] for step in steps]
-
-
-def over_white(pixels: Float32Array) -> Float32Array:
-    """Straight alpha laid on white; [H, W, 3]."""
-    return pixels[..., :3] * pixels[..., 3:] + (1.0 - pixels[..., 3:])
 
 
 def color_error(picture: Float32Array, other: Float32Array) -> float:

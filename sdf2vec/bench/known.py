@@ -26,11 +26,11 @@ from .known_drawing import KnownScene
 from .known_scenes import COUNTS, MODES, SIDE, known_scene
 from .peers import drawn_by
 from .recovery import ENOUGH, Answer, Verdict, f1, judged, scene_answer, svg_answer
+from .sheet import spaced
 from .table import Asked, Page
 
 SEEDS = 20
 KINDS = "circle,ellipse,box,triangle"
-GUTTER = 3  # pixels between pictures of the figure
 JAGGED = "jagged"
 EDGES = ("sharp", "soft", JAGGED)
 
@@ -120,7 +120,7 @@ def result(tool: str, case: Case, known: KnownScene, options: argparse.Namespace
     """One scene through one tool."""
     answer = TOOLS[tool](case, known, options)
     verdict = judged(known, answer)
-    return Result(case, verdict, np.vstack([known.given, _gutter(known.side, across=True), answer.pixels]))
+    return Result(case, verdict, spaced([known.given, answer.pixels], across=False))
 
 
 # --- the page -----------------------------------------------------------------------------------------------
@@ -179,23 +179,8 @@ def figure(results: list[Result]) -> bytes:
             if (r.case.mode, r.case.edges) == (mode, edges):
                 first.setdefault(r.case.true, r.pictures)
         if first:
-            rows.append(_spaced([first[count] for count in sorted(first)], across=True))
-    return encode_png(_spaced(rows, across=False))
-
-
-def _spaced(pictures: list[Float32Array], across: bool) -> Float32Array:
-    """Pictures beside or below each other, with white between them; a shorter row ends in white."""
-    widest = max(picture.shape[1] for picture in pictures)
-    spaced: list[Float32Array] = []
-    for picture in pictures:
-        if not across:
-            picture = np.pad(picture, ((0, 0), (0, widest - picture.shape[1]), (0, 0)), constant_values=1)
-        spaced += [picture, _gutter(picture.shape[0 if across else 1], not across)]
-    return np.concatenate(spaced[:-1], axis=1 if across else 0)
-
-
-def _gutter(length: int, across: bool) -> Float32Array:
-    return np.ones((GUTTER, length, 3) if across else (length, GUTTER, 3), np.float32)
+            rows.append(spaced([first[count] for count in sorted(first)], across=True))
+    return encode_png(spaced(rows, across=False))
 
 
 def page(found: dict[str, list[Result]], asked: Asked) -> Page:

@@ -12,7 +12,7 @@ import shutil
 import subprocess
 import sys
 import tempfile
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from importlib.util import find_spec
 from pathlib import Path
@@ -69,6 +69,10 @@ class Peer:
             return sys.executable
         names = (given,) if given else self.programs
         return next(filter(None, map(shutil.which, names)), None)
+
+    def among(self, programs: Mapping[str, str]) -> str | None:
+        """The same, of programs whose places were told, by their names."""
+        return self.found(programs.get(self.programs[0]))
 
 
 # --- calls --------------------------------------------------------------------------------------------------
@@ -147,6 +151,14 @@ PEERS: dict[str, Peer] = {
     ),
     "sqip": Peer("sqip, blurred triangles", ("sqip",), _sqip),
 }
+
+
+def required(name: str, programs: Mapping[str, str]) -> str:
+    """Where the program of a peer is. Raises Sdf2vecError where it isn't."""
+    where = PEERS[name].among(programs)
+    if where is None:
+        raise Sdf2vecError(f"{name}: not on this machine; --peer NAME=PATH tells where it is")
+    return where
 
 
 def drawn_by(

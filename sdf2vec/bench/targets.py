@@ -23,7 +23,8 @@ from ..image import Picture, encode_png, load, resize
 from ..outputs import stem_of
 from . import choices
 from .methods import Method, methods_of
-from .peers import programs_of
+from .peers import programs_of, required
+from .sheet import spaced
 from .table import Asked, Page
 from .thesis import PICTURE, PRINTED
 
@@ -37,11 +38,8 @@ quality: Callable[[Scene, Picture], Quality] = deferred("sdf2vec.quality", "qual
 source_of: Callable[[str, Picture, Path], Source] = deferred("sdf2vec.bench.measuring", "source_of")
 run_of: Callable[..., tuple[Run, Float32Array]] = deferred("sdf2vec.bench.measuring", "measured")
 
-FIGURE, COLUMN, GUTTER = (
-    ".png",
-    192,
-    4,
-)  # pixels: how wide a picture of the figure is, and what is between them
+FIGURE = ".png"
+COLUMN, GUTTER = 192, 4  # pixels: how wide a picture of the figure is, and what is between them
 PRINTED_NAME = "thesis, printed"
 
 
@@ -152,10 +150,8 @@ def figure(rows: Sequence[Sequence[Float32Array]]) -> bytes:
     for images in rows:
         height = round(COLUMN * images[0].shape[0] / images[0].shape[1])
         small = [resize(np.ascontiguousarray(image), COLUMN, height) for image in images]
-        strips.append(
-            np.hstack([np.pad(s, ((0, GUTTER), (0, GUTTER), (0, 0)), constant_values=1) for s in small])
-        )
-    return encode_png(np.vstack(strips)[:-GUTTER, :-GUTTER])
+        strips.append(spaced(small, across=True, gutter=GUTTER))
+    return encode_png(spaced(strips, across=False, gutter=GUTTER))
 
 
 # --- the command --------------------------------------------------------------------------------------------
@@ -191,7 +187,7 @@ def add_choices(parser: argparse.ArgumentParser) -> None:
 def pages(options: argparse.Namespace, asked: Asked) -> Iterator[Page]:
     """A page after each picture. Raises Sdf2vecError."""
     fit, programs = choices.fit_of(options), programs_of(options.peer)
-    methods = [(method, _program_of(method, programs)) for method in options.beside]
+    methods = [(each, required(each.name, programs) if each.peer else "") for each in options.beside]
     names = [PRINTED_NAME, *(method.name for method in options.beside)]
     lines, rows = list(head(names)), []
     for path in options.pictures:
@@ -207,13 +203,3 @@ def pages(options: argparse.Namespace, asked: Asked) -> Iterator[Page]:
         rows.append([picture.pixels[..., :3], *(one.image for one in ours)])
         shown = asked.figure(FIGURE, "The picture, then what was found for each FLIP")
         yield asked.page("What a FLIP takes", ABOUT, "\n".join(lines), shown, figures={FIGURE: figure(rows)})
-
-
-def _program_of(method: Method, programs: Mapping[str, str]) -> str:
-    """Where a method's program is; empty for ours. Raises Sdf2vecError where it isn't."""
-    if method.peer is None:
-        return ""
-    where = method.peer.found(programs.get(method.peer.programs[0]))
-    if where is None:
-        raise Sdf2vecError(f"{method.name}: not on this machine; --peer NAME=PATH tells where it is")
-    return where

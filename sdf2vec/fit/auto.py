@@ -318,7 +318,7 @@ class Drawing:
         with suppress(Stopped):
             made = descended(before, view, self.search, SHARPENED, simple=True)
             is_nearer = error_of(made, view) < error_of(before, view)
-            if is_nearer and (self._has_met(made) or not self._has_met(before)):
+            if is_nearer and (not self._has_met(before) or self._has_met(made)):
                 return concise(self._scene_of(made), self.picture, self.settings)
         return scene
 

@@ -70,3 +70,10 @@ def test_a_column_for_each_other_program(program, black, capsys, monkeypatch):
 def test_programs_that_do_not_grow_are_refused(black, capsys):
     assert bench("byte-limits", black, "--beside", "vtracer") == 2
     assert "primitive" in capsys.readouterr().err
+
+
+def test_a_program_that_is_missing_is_said_before_anything_is_fitted(black, capsys, monkeypatch):
+    monkeypatch.setenv("PATH", "")
+    monkeypatch.setattr(byte_limits, "measured", lambda *given, **options: pytest.fail("fitted"))
+    assert bench("byte-limits", black, "--targets", "svg", "--beside", "primitive") == 2
+    assert "primitive: not on this machine" in capsys.readouterr().err
