@@ -73,6 +73,7 @@ def test_programs_that_do_not_grow_are_refused(black, capsys):
 
 
 def test_a_program_that_is_missing_is_said_before_anything_is_fitted(black, capsys, monkeypatch):
+    monkeypatch.setitem(byte_limits.TARGETS, "svg", ("resvg",))  # whether a browser is there is told once
     monkeypatch.setenv("PATH", "")
     monkeypatch.setattr(byte_limits, "measured", lambda *given, **options: pytest.fail("fitted"))
     assert bench("byte-limits", black, "--targets", "svg", "--beside", "primitive") == 2
