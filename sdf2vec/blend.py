@@ -191,8 +191,13 @@ scene_point, pixel_size = FRAMINGS["fit"]
 
 def cropped(color: Expr, p: Expr, size: Expr, ground: Expr) -> Expr:
     """The colour at p within a scene of this size, the ground outside."""
+    return select(within(p, size), color, ground)
+
+
+def within(p: Expr, size: Expr) -> Expr:
+    """Whether p is in a scene of this size."""
     beyond = [absolute(at) - 0.5 * side for at, side in ((p.x, size.x), (p.y, size.y))]
-    return select(maximum(*beyond) > 0.0, ground, color)
+    return maximum(*beyond) < 0.0
 
 
 @function("surfacePoint", uv=VEC2, size=VEC2)

@@ -18,7 +18,7 @@ from collections.abc import Hashable
 from functools import partial
 from weakref import WeakValueDictionary
 
-from .folding import SIMPLER
+from .folding import SIMPLER, scalars_of
 from .operation import (
     CALL,
     FLOAT,
@@ -381,6 +381,7 @@ def operation(op: str, *args: Operand) -> Expr:
     """The node of a table row, folded where that is trivial. Raises TypeError when the types do not fit."""
     row = OPERATIONS[op]
     given = tuple(expression_of(arg) for arg in args)
+    given = scalars_of(given) if op.startswith("vec") else given
     type = row.result([arg.type for arg in given])
     if row.value and type is FLOAT and all(arg.op == "const" for arg in given):
         return const(row.value(*(constant(arg) for arg in given)))
@@ -492,6 +493,11 @@ def component(v: Expr, index: int) -> Expr:
     """Component `index` of a vector."""
     if index >= v.type.width or v.type.width == 1:
         raise TypeError(f"{v.type.value} has no component {index}")
-    if v.op == f"vec{v.type.width}" and len(v.args) == v.type.width:
-        return v.args[index]
+    if v.op == f"vec{v.type.width}":
+        if len(v.args) == 1:
+            return v.args[0]
+        for arg in v.args:
+            if index < arg.type.width:
+                return arg if arg.type is FLOAT else component(arg, index)
+            index -= arg.type.width
     return node("component", (v,), FLOAT, index)

@@ -48,6 +48,15 @@ def _simple_select(condition: Expr, a: Expr, b: Expr) -> Expr | None:
     return a if a is b else None
 
 
+def scalars_of(args: tuple[Expr, ...]) -> tuple[Expr, ...]:
+    """What joins to the same vector: scalars that are joined twice, joined once."""
+    return tuple(part for arg in args for part in (arg.args if _is_joined(arg) else (arg,)))
+
+
+def _is_joined(expr: Expr) -> bool:
+    return expr.op.startswith("vec") and len(expr.args) == expr.type.width
+
+
 # By operation: what it is where its arguments are trivial, None where they are not.
 SIMPLER: dict[str, Callable[..., Expr | None]] = {
     "add": _simple_add,

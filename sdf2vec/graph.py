@@ -37,17 +37,32 @@ def substitute(expr: Expr, values: Mapping[Expr, Expr]) -> Expr:
     return done[expr]
 
 
-def opened(expr: Expr) -> Expr:
-    """Sees through the calls of functions that have no local variables and use each argument once at most."""
+def opened(expr: Expr, others: Container[Function] = ()) -> Expr:
+    """Sees through the calls of functions that have no local variables and use each argument once at most, and
+    through those of `others`; names of local variables are dropped.
+    """
     done: dict[Expr, Expr] = {}
     for node in walk([expr]):
         args = tuple(done[arg] for arg in node.args)
         function = node.payload
-        if isinstance(function, Function) and _is_brief(function):
-            done[node] = substitute(opened(function.body), dict(zip(function.parameters, args, strict=True)))
+        if isinstance(function, Function) and (function in others or _is_brief(function)):
+            body = opened(function.body, others)
+            done[node] = substitute(body, dict(zip(function.parameters, args, strict=True)))
         else:
-            done[node] = _rebuild(node, args)
+            done[node] = args[0] if node.op == "let" else _rebuild(node, args)
     return done[expr]
+
+
+def called_once(roots: Iterable[Expr]) -> set[Function]:
+    """The functions that are called at one place only, of all that the expressions call, directly or not."""
+    calls: Counter[Function] = Counter()
+    rest = list(roots)
+    while rest:
+        for node in walk([rest.pop()]):
+            if isinstance(node.payload, Function):
+                rest += [] if node.payload in calls else [node.payload.body]
+                calls[node.payload] += 1
+    return {called for called, times in calls.items() if times == 1}
 
 
 def _is_brief(function: Function) -> bool:

@@ -24,6 +24,7 @@ FAINTEST = 0.02  # opacity where colours are not signed: below it a shape would 
 GRAIN = 0.001  # scene units: falloffs much below it are packed in equal steps
 GEOMETRY_DECIMALS = 6
 COLOR_DECIMALS = 5
+ROOT_DECIMALS = 4  # of the ends between which the roots of lengths are fractions
 
 
 class Room(NamedTuple):
@@ -257,7 +258,9 @@ def _grown_between(unit: str) -> Callable[[Expr, Fractions], Expr]:
     """A length between the least and the largest of the scene, in steps that are the larger the longer it is."""
 
     def decode(v: Expr, of: Fractions) -> Expr:
-        low, high = map(_root, of.ranges[unit])
+        if len(set(of.ranges[unit])) == 1:
+            return const(of.ranges[unit][0])
+        low, high = (round(_root(end), ROOT_DECIMALS) for end in of.ranges[unit])
         return grown(low + v * (high - low))
 
     return decode

@@ -9,6 +9,7 @@ import torch
 from sdf2vec.expr import (
     OPERATIONS,
     clamp,
+    component,
     const,
     constant,
     fixed,
@@ -20,9 +21,11 @@ from sdf2vec.expr import (
     sin,
     var,
     vec2,
+    vec3,
+    vec4,
 )
 from sdf2vec.function import function, let
-from sdf2vec.graph import gradient, hoist, scalarize, substitute, walk
+from sdf2vec.graph import called_once, gradient, hoist, opened, scalarize, substitute, walk
 from sdf2vec.lower.torch import compile_torch
 from sdf2vec.operation import BOOL, FLOAT, VEC2, VEC3
 from tests.operations import MEANINGS, SMOOTH, expected
@@ -52,6 +55,34 @@ def test_trivial_operations_fold():
     assert constant(const(2.0) * 3.0 - 1.0) == 5.0
     assert vec2(a, b).y is b
     assert select(a < b, a, a) is a
+
+
+def test_a_component_of_what_is_joined_is_that_part():
+    a, b, c = (var(name) for name in "abc")
+    v = var("v", VEC2)
+    assert component(vec4(v, a, b), 2) is a
+    assert component(vec4(a, v, b), 2) is component(v, 1)
+    assert component(vec3(a), 2) is a
+    assert vec4(vec3(a, b, c), 1.0) is vec4(a, b, c, 1.0)
+    assert vec4(vec3(a), b).args == (vec3(a), b)  # repeated, not joined
+
+
+def test_what_is_called_at_one_place_is_written_there():
+    @function("once", x=FLOAT)
+    def once(x):
+        root = let("root", x + 1.0)
+        return root * root
+
+    @function("twice", x=FLOAT)
+    def twice(x):
+        return let("y", x * 2.0) + once(x)
+
+    a, b = var("a"), var("b")
+    roots = [twice(a) + b, twice(b)]
+    assert called_once(roots) == {once}
+    assert called_once([twice(a)]) == {once, twice}
+    assert opened(roots[0], {once}) is roots[0]  # functions that stay are looked at from outside
+    assert opened(roots[0], {once, twice}) is (a * 2.0 + (a + 1.0) * (a + 1.0)) + b
 
 
 def test_zero_times_a_vector_stays_a_vector():

@@ -15,6 +15,8 @@ TOKEN = re.compile(
     r"#[^\n]*|(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?\w*|\w+|\s+|\+\+|--|&&|\|\||<<|>>|->|[-<>=!+*/&|^]=|[^\w\s]"
 )
 TYPE = re.compile(r"float|int|bool|void|[iu]?vec[234]|mat[234]")
+VECTOR = re.compile(r"vec[234]f?")
+BRACKETS = ("([{", ")]}")
 NAME = re.compile(r"[A-Za-z_]\w*")
 DECLARED = ("=", ",", ";", "[", ")")  # what may follow a name that is declared
 KEPT = {"main", "mainImage"}
@@ -26,8 +28,8 @@ def dense(text: str, renamed: bool) -> str:
     """GLSL or WGSL without what only a reader needs; with short names only where no one else calls them (GLSL)."""
     tokens = [token for token in TOKEN.findall(COMMENT.sub(" ", text)) if not token.isspace()]
     written, before = [f"// {MARK}\n"], "\n"
-    for said in _declared_together(_renamed(tokens) if renamed else tokens):
-        short = _short(said)
+    said = list(map(_short, _declared_together(_renamed(tokens) if renamed else tokens)))
+    for short in _whole(said):
         written.append(_between(before, short) + short)
         before = short
     return "".join(written).strip() + "\n"
@@ -51,6 +53,19 @@ def _short(token: str) -> str:
         return token
     whole, part = said[1].lstrip("0"), said[2]
     return f"{whole}.{part}" if whole or part else "0."
+
+
+def _whole(tokens: Sequence[str]) -> Iterator[str]:
+    """Whole numbers of which a vector is made without a point."""
+    makers = [""]  # of what brackets are open, by what is before them
+    for before, token, after in zip(["", *tokens], tokens, [*tokens[1:], ""], strict=False):
+        if token in BRACKETS[0]:
+            makers.append(before)
+        elif token in BRACKETS[1]:
+            makers.pop()
+        is_alone = before in ("(", ",") and after in (",", ")")
+        is_vector = VECTOR.fullmatch(makers[-1]) and is_alone
+        yield token[:-1] if is_vector and re.fullmatch(r"\d+\.", token) else token
 
 
 def _declared_together(tokens: Sequence[str]) -> list[str]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
+from dataclasses import replace
 from functools import partial
 
 import torch
@@ -19,6 +20,7 @@ from .packing import Packed, Packer
 from .rounding import Bits, Chooser, Rounded
 
 GREY = 1.5 / 255.0  # by which the channels of a grey may differ, all of which are fitted again
+GROUND_DECIMALS = 3
 ROOM = 0.01  # scene units that a fit may move edges by without other cells
 LOOKED_AT = dict(zip(PRECISIONS, (1, 5, 5, 5), strict=True))  # bits at first; of places, in falloffs
 LEAST = dict(zip(PRECISIONS, (-4, 2, 2, 2), strict=True))
@@ -42,7 +44,7 @@ class PackedRounding:
         counts = self.packer.bit_counts(precision)
 
         def write(said: Scene) -> tuple[Exported, Scene]:
-            packer = self.packer.moved(said, self.slack)
+            packer = self.packer.moved(_on_brief_ground(said), self.slack)
             found = packer.quantised(precision, counts)
             return self.text(found, packer.pack(precision, counts)), found
 
@@ -82,6 +84,14 @@ class SmallestPacked:
 
     def __call__(self, aim: float) -> Rounded:
         return min((way(aim) for way in self.ways), key=lambda made: len(made.write(self.scene)[0].raw))
+
+
+def _on_brief_ground(scene: Scene) -> Scene:
+    """The scene on a ground said in few digits."""
+    if scene.background is None:
+        return scene
+    red, green, blue, *alpha = (round(value, GROUND_DECIMALS) for value in scene.background)
+    return replace(scene, background=(red, green, blue, alpha[0]) if alpha else (red, green, blue))
 
 
 def _precision(bits: Bits) -> Precision:

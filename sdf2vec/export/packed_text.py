@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+import math
 from typing import Any
 
-from ..expr import Expr, const, var, vec2
-from ..graph import opened
+from ..expr import Expr, const, length, var, vec2
+from ..graph import called_once, opened, substitute
 from ..layer import JOIN, LOOK, STILL, P, shape_at
-from ..lower.shader import Dialect, expression
+from ..lower.shader import Dialect, expression, statements
 from ..operation import VEC2
 from ..paints import PAINTS
 from ..scene import Scene
@@ -15,28 +16,44 @@ from ..shapes import KINDS
 from ..units import Parameter
 from .layouts import WORD
 from .packed_bits import COUNT_BITS, PLACE, by_precision
-from .packing import Packed, decoded
-from .records import Form, Variant, drawn_by, joined_by
+from .packing import BOX, CORNER, Packed, decoded
+from .records import FIELD, Form, Variant, drawn_by, joined_by
 
 
 class PackedText:
-    """The text of a packed scene; `motion` is added to distances."""
+    """The text of a packed scene; `motion` is added to distances. What is called at one place only is written there.
+
+    `is_plain`: all layers are as long as each other and are drawn by one statement.
+    """
 
     def __init__(self, packed: Packed, scene: Scene, dialect: Dialect, motion: Expr = STILL) -> None:
         self.packed, self.dialect = packed, dialect
         self.layout = layout = packed.layout
-        self.form = Form(layout.variants, layout.joins, scene.compositing)
         self.is_shared = layout.boxes.is_shared
+        self.is_plain = self.is_shared and len(layout.variants) == 1 and not layout.joins
+        form = Form(layout.variants, layout.joins, scene.compositing)
         opacity, falloff = (self._field(parameter) for parameter in LOOK)
-        self.drawn = opened(drawn_by(self.form, var("float(kind)"), opacity, falloff, motion))
-        self.joined = joined_by(layout.joins, var("float(join)"), var("smoothness")) if layout.joins else None
-        self.fields = [self._at(variant) for variant in layout.variants]
+        drawn = drawn_by(form, var("float(kind)"), opacity, falloff, motion)
+        fields = [self._at(variant) for variant in layout.variants]
+        joins = [joined_by(layout.joins, var("float(join)"), self._smoothness())] if layout.joins else []
+        if self.is_plain:
+            drawn, fields = substitute(drawn, {FIELD: self._within_shared(fields[0])}), []
+        once = called_once([drawn, *fields, *joins])
+        self.drawn, *self.fields = (opened(formula, once) for formula in (drawn, *fields))
+        self.joined = [opened(formula, once) for formula in joins]
 
     @property
     def roots(self) -> list[Expr]:
         """All formulas of the text."""
-        own = [self._field(LOOK[1]), *([self._smoothness()] if self.joined else [])]
-        return [self.drawn, *([self.joined] if self.joined else []), *self.fields, *own]
+        return [self.drawn, *self.joined, *self.fields]
+
+    def _within_shared(self, field: Expr) -> Expr:
+        """A formula with the numbers of the one box of all layers, a square."""
+        side = 1.0 / self.packed.grid.per_unit
+        corner = vec2(*map(const, self.packed.grid.low))
+        return substitute(
+            field, {length(BOX): const(side * math.sqrt(2.0)), BOX: const(side), CORNER: corner}
+        )
 
     def part(self) -> dict[str, Any]:
         """What the template takes."""
@@ -47,12 +64,13 @@ class PackedText:
             "place": (P - corner) * packed.grid.per_unit,
             "corner": corner if self.is_shared else corner + low * side,
             "box": vec2(const(side)) if self.is_shared else (high - low) * side,
-            "drawn": self.drawn,
         }
         start = layout.before_shapes(bits)
         count = packed.least + boxes.spread
         return {
             **{name: self._say(value) for name, value in values.items()},
+            "drawn": statements("c = {};", self.drawn, self.dialect),
+            "plain": self.is_plain,
             "words": packed.words,
             "word": WORD,
             "end": packed.bits,
@@ -65,23 +83,22 @@ class PackedText:
             "count": COUNT_BITS,
             "start": start,
             "size": self._size(),
-            "window": layout.window(bits, count),
+            "window": 0 if packed.is_short else layout.window(bits, count),
             "most": layout.most()[1],
             "variants": [
-                (*layout.counts(variant), self._say(field))
-                for variant, field in zip(layout.variants, self.fields, strict=True)
+                (*layout.counts(variant), statements("return {};", field, self.dialect))
+                for variant, field in zip(layout.variants, self.fields, strict=not self.is_plain)
             ],
             "color": bits.color,
             **self._joined_part(),
         }
 
     def _joined_part(self) -> dict[str, Any]:
-        if self.joined is None:
-            return {"joined": ""}
+        if not self.joined:
+            return {"joined": []}
         return {
-            "joined": self._say(self.joined),
+            "joined": statements("s = {};", self.joined[0], self.dialect),
             "join": self.layout.join_bits,
-            "smoothness": self._say(self._smoothness()),
             "before": self.layout.before_numbers(self.packed.precision),
         }
 
@@ -114,15 +131,16 @@ class PackedText:
         """Colour and field of a shape whose colours are at the place `at`; the others are in `v`, or behind."""
         kind, paint = KINDS[variant.kind], PAINTS[variant.paint]
         bits, colors, places = self.packed.precision.color, 0, 0
+        start = self.layout.before_shapes(self.packed.precision) if self.is_plain else 0
         values: dict[Parameter, Expr] = {}
         for parameter in by_precision((*paint.parameters, *kind.parameters)):
             fractions = []
             for _ in range(self.layout.width(parameter)):
                 if parameter.unit.codec.precision == PLACE:
-                    fractions.append(self._place(colors * bits, places))
+                    fractions.append(self._place(start + colors * bits, places))
                     places += 1
                 else:
-                    fractions.append(_part("at", colors * bits, bits))
+                    fractions.append(self._part(start + colors * bits, bits))
                     colors += 1
             values[parameter] = decoded(parameter, fractions, self.packed.ranges)
         parameters = [values[parameter] for parameter in kind.parameters]
@@ -131,7 +149,11 @@ class PackedText:
     def _place(self, before: int, index: int) -> Expr:
         """One fraction of those behind so many bits."""
         least = self.packed.least
-        return _part("at", before + index * least, least) if self.is_shared else var(f"v[{index}]")
+        return self._part(before + index * least, least) if self.is_shared else var(f"v[{index}]")
+
+    def _part(self, further: int, bits: int) -> Expr:
+        """The fraction of a shape that is so many bits further, where all layers are as long from their start."""
+        return _part("start" if self.is_plain else "at", further, bits)
 
     def _say(self, value: Expr) -> str:
         return expression(value, self.dialect)

@@ -54,6 +54,8 @@ SAMPLE = 1 << 21  # shapes × pixels that are looked at where no kernels are wor
 BLOCKS, MANY = 4, 256  # of cells along a side, where there are more layers than so many
 LEAST_BITS, MOST_BITS = 4, 24  # of a fraction; a float holds no more
 FEWER = 5  # bits that all layers begin without, when the fewest are looked for
+BRIEF = 1e-3  # scene units: the step of the corner and the side of a single box
+SHORT = 128  # words that a shader reads without a window: more take compilers long
 ROUNDS = 60
 BLAME = (
     0.97  # of the largest share that a layer has in what is off at a pixel: who has so much gets more bits
@@ -87,6 +89,11 @@ class Packed:
     ranges: Ranges
     layout: Layout
     error: float
+
+    @property
+    def is_short(self) -> bool:
+        """Whether a shader may look at all words wherever it reads one: some compilers copy them all."""
+        return len(self.words) <= SHORT
 
 
 # --- what a fraction stands for ----------------------------------------------------------------------------
@@ -319,7 +326,10 @@ class Packer:
             for value, bits in self._layer(layer, cells, count, precision)[0]:
                 stream.put(value, bits)
             last = stream.bits - self.layout.longest(precision, count)  # where the last shape may begin
-        words = stream.words(last // WORD + self.layout.window(precision, least + self.layout.boxes.spread))
+        words = stream.words((stream.bits - 1) // WORD + 2)
+        if len(words) > SHORT:
+            window = self.layout.window(precision, least + self.layout.boxes.spread)
+            words = stream.words(last // WORD + window)
         return Packed(words, stream.bits, self.grid, least, precision, self.ranges, self.layout, error)
 
     def _layer(
@@ -411,6 +421,9 @@ def _grid_of(boxes: Float64Array, across: int) -> Grid:
     """A grid that holds everything."""
     low, high = boxes[:, :2].min(axis=0), boxes[:, 2:].max(axis=0)
     size = float((high - low).max()) * (1.0 + 1e-5)
+    if across == 1:
+        corner = (_floor(low[0]), _floor(low[1]))
+        return Grid(1, 1, 1.0 / _floor(size + 2.0 * BRIEF), corner)
     corner = (_rounded(low[0] - 2e-6 * size), _rounded(low[1] - 2e-6 * size))
     return Grid(across, across, _rounded_down(across / size), corner)
 
@@ -441,6 +454,11 @@ def _bounds(scene: Scene, slack: float, boxes: Boxes) -> Float64Array:
 
 def _rounded(value: float) -> float:
     return float(np.float32(round(value, COLOR_DECIMALS)))
+
+
+def _floor(value: float) -> float:
+    """The same with few digits, no more than it was."""
+    return round(math.floor(value / BRIEF) * BRIEF, COLOR_DECIMALS)
 
 
 def _rounded_down(value: float) -> float:

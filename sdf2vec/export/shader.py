@@ -12,10 +12,11 @@ import numpy as np
 from msgspec import structs
 
 from ..arrays import Float32Array, IntArray
-from ..blend import COMPOSITING, CROP, FRAMINGS, cropped, display, grid_point, surface_point
+from ..blend import COMPOSITING, CROP, FRAMINGS, cropped, display, grid_point, surface_point, within
 from ..deferred import deferred
 from ..errors import Sdf2vecError
 from ..expr import Expr, const, var, vec2, vec4
+from ..graph import opened, substitute
 from ..layer import PIXEL, STILL, Formula, P, Structure, constant_row
 from ..limits import TEXT_SHAPES
 from ..lower.shader import GLSL, WGSL, Dialect, definition, expression, literal, statements, used_functions
@@ -51,6 +52,7 @@ packed_text: Callable[..., Any] = deferred(
 )  # needs torch, as all below
 pack: Callable[[Scene, float], Packed] = deferred("sdf2vec.export.packing", "pack")
 packed_rounding: Callable[..., Any] = deferred("sdf2vec.export.packed_rounding", "SmallestPacked")
+FRAG, RESOLUTION = var("fragCoord", VEC2), var("resolution", VEC2)
 SEEN = var("{seen}", VEC4)  # where a template puts the colour that is seen
 MOST_READABLE = TEXT_LIMIT // 50  # shapes; none is said in so few bytes
 TEXTS = ("readable", "table", "packed")  # layouts that may take few bytes
@@ -199,6 +201,8 @@ def _shader(scene: Scene, target: Target, options: Options, packed: Packed | Non
         output="gl_FragColor" if options.glsl == "es100" else "fragColor",
         display="" if job.is_displayable else "display",
         cropped=job.say(cropped(SEEN, P, _size(scene), job.ground)) if job.framing == CROP else "",
+        within=job.say(within(P, _size(scene))) if job.framing == CROP else "",
+        framed=job.framed() if job.is_one_function else [],
         dragged=job.say(dragged(P, PIXEL)) if job.is_turned else "",
         place=expression(surface_point(var(target.surface, VEC2), _size(scene)), target.dialect),
         **(dict.fromkeys(("table", "packed", "tiles", "data")) | {"layers": []} | parts),
@@ -304,8 +308,27 @@ class _Job:
         within = not COMPOSITING[self.scene.compositing].signed and self.scene.opaque
         return self.choice.layout == "packed" and within
 
+    @property
+    def is_one_function(self) -> bool:
+        """Whether all that is drawn is drawn in the function that the host calls."""
+        return self.choice.layout == "packed" and self.target.has_knobs and bool(self.scene.layers)
+
+    def framed(self) -> list[str]:
+        """Statements that find the size of a `pixel` and the point `p` of the pixel at `fragCoord`."""
+        place, pixel_size = FRAMINGS[self.framing]
+        at, size = vec2(FRAG.x, RESOLUTION.y - FRAG.y), _size(self.scene)  # y down
+        pixel = pixel_size(RESOLUTION, size)
+        found = opened(place(at, RESOLUTION, size), {place})
+        point = substitute(found, {pixel: PIXEL})
+        return [
+            *statements("float pixel = {};", opened(pixel, {pixel_size}), self.dialect),
+            *statements("vec2 p = {};", point, self.dialect),
+        ]
+
     def _frame(self) -> list[Expr]:
         """From a pixel, or a place on a surface, to a point."""
+        if self.is_one_function:
+            return []
         if self.target.surface:
             return [surface_point(P, P)]
         place, pixel_size = FRAMINGS[self.framing]
@@ -318,7 +341,8 @@ class _Job:
 
 
 def _size(scene: Scene) -> Expr:
-    return vec2(*(const(side) for side in scene.extent))
+    width, height = map(const, scene.extent)
+    return vec2(width) if width is height else vec2(width, height)
 
 
 def _background(scene: Scene) -> Expr:

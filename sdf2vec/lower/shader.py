@@ -116,7 +116,9 @@ def _trivial(node: Expr) -> bool:
     """Too short for a name of its own."""
     if node.op in ("component", "neg"):
         return node.args[0].op in ("var", "let", "const")
-    return node.op in ("var", "const") or all(arg.op == "const" for arg in node.args)
+    if node.op == "var":
+        return "(" not in str(node.payload)  # some stand for what is called
+    return node.op == "const" or all(arg.op == "const" for arg in node.args)
 
 
 def _print(expr: Expr, dialect: Dialect, names: dict[Expr, str]) -> tuple[str, int]:

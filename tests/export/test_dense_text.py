@@ -15,7 +15,9 @@ from tests.scenes import random_scene
         ("/* two\nlines */ x = 1.0 - -y;", "x=1.- -y;"),
         ("for (int i = 0; i < 10; i++) c += d.x;", "for(int i=0;i<10;i++)c+=d.x;"),
         ("a = 1e-20;\n#define N 3\nb = N;", "a=1e-20;\n#define N 3\nb=N;"),
-        ("vec4 v = vec4(0.0, 10.0, 100, 0);", "vec4 v=vec4(0.,10.,100,0);"),
+        ("vec4 v = vec4(0.0, 10.0, 100, 0);", "vec4 v=vec4(0,10,100,0);"),
+        ("v = vec3f(0.50, a * 2.0, f(1.0)) + f(3.0, 1.0);", "v=vec3f(.5,a*2.,f(1.))+f(3.,1.);"),
+        ("v = vec2(f(vec2(2.0), 3.0).x, 4.0);", "v=vec2(f(vec2(2),3.).x,4);"),
     ],
 )
 def test_what_only_readers_need_goes(text, wanted):
@@ -27,7 +29,7 @@ def test_declared_names_are_short_and_members_stay():
         "float blend(vec2 place) { return place.x + sin(place.y); }\nvoid mainImage() { blend(vec2(1.0)); }"
     )
     assert dense(text, renamed=True).splitlines()[1] == (
-        "float a(vec2 b){return b.x+sin(b.y);}void mainImage(){a(vec2(1.));}"
+        "float a(vec2 b){return b.x+sin(b.y);}void mainImage(){a(vec2(1));}"
     )
 
 
