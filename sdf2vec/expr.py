@@ -494,10 +494,7 @@ def component(v: Expr, index: int) -> Expr:
     if index >= v.type.width or v.type.width == 1:
         raise TypeError(f"{v.type.value} has no component {index}")
     if v.op == f"vec{v.type.width}":
-        if len(v.args) == 1:
-            return v.args[0]
-        for arg in v.args:
-            if index < arg.type.width:
-                return arg if arg.type is FLOAT else component(arg, index)
-            index -= arg.type.width
+        parts = [(arg, place) for arg in v.args for place in range(arg.type.width)]
+        arg, place = parts[index % len(parts)]  # one part is repeated
+        return arg if arg.type is FLOAT else component(arg, place)
     return node("component", (v,), FLOAT, index)

@@ -19,7 +19,7 @@ from .engines import ENGINES
 from .errors import Sdf2vecError
 from .export.exported import Exported
 from .export.options import SVG_PROFILES, Options
-from .export.shader import DATA_WIDTH
+from .export.table_text import DATA_WIDTH
 from .exports import Exports
 from .image import fitted_size, premultiply
 from .metrics import psnr

@@ -26,7 +26,8 @@ from ..scene import Layer, Scene
 from .layouts import TEXT_LIMIT, fits_constants
 from .options import Options
 from .records import BELOW, first_records
-from .shader import MOST_READABLE, TARGETS, shader, statements_of, statements_text, table_rows
+from .shader import MOST_READABLE, TARGETS, shader, statements_of, statements_text
+from .table_text import table_rows
 
 NUMBER = re.compile(r"(?<![\w.])\d+\.\d+(?:e[-+]?\d+)?|\b50021\b")
 FIRST = 50021  # the number of a shape that no text has

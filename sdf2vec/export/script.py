@@ -19,7 +19,8 @@ from ..scene import GROUND, MAX_JOINED, MAX_SHAPES, OPTIONAL, SHEER
 from ..shapes import KINDS
 from ..units import COLOR, COLOR_DECIMALS, OPACITY, Parameter
 from .records import Form, Variant, record_scalars
-from .shader import DATA_WIDTH, table_part
+from .shader import table_part
+from .table_text import DATA_WIDTH
 from .tiles import COARSEST
 
 SLACK = var("slack")

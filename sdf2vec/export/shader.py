@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import base64
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass, replace
 from functools import partial
 from typing import TYPE_CHECKING, Any
@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from msgspec import structs
 
-from ..arrays import Float32Array, IntArray
+from ..arrays import Float32Array
 from ..blend import COMPOSITING, CROP, FRAMINGS, cropped, display, grid_point, surface_point, within
 from ..deferred import deferred
 from ..errors import Sdf2vecError
@@ -42,6 +42,7 @@ from .layouts import (
 from .options import BUFFER, GLSL_VERSIONS, Options
 from .records import BELOW, COUNT, JOIN, OWN, Form, first_records, form_of, records, slot
 from .rounding import Rounding
+from .table_text import DATA_WIDTH, data_array, ivec4s, table_rows, words_of
 from .tiles import COARSEST, Tiles
 
 if TYPE_CHECKING:
@@ -57,7 +58,6 @@ SEEN = var("{seen}", VEC4)  # where a template puts the colour that is seen
 MOST_READABLE = TEXT_LIMIT // 50  # shapes; none is said in so few bytes
 TEXTS = ("readable", "table", "packed")  # layouts that may take few bytes
 DENSE = "without comments, names and spaces"
-DATA_WIDTH = 256  # texels in a row of a data texture
 
 
 @dataclass(frozen=True)
@@ -399,18 +399,12 @@ def _tiled(job: _Job) -> dict[str, Any]:
     bits = max(1, int(entries.max(initial=0)).bit_length())
     per = WORD // bits
     part = _grid_part(job, tiles) | {
-        "starts": _ivec4s(tiles.starts.tolist()),
-        "lists": _ivec4s(words_of(entries.tolist(), bits, per)),
+        "starts": ivec4s(tiles.starts.tolist()),
+        "lists": ivec4s(words_of(entries.tolist(), bits, per)),
         "bits": bits,
         "per": per,
     }
     return _table(job) | _loop(job, form_of(job.scene), tiles) | {"tiles": part}
-
-
-def words_of(numbers: Sequence[int], bits: int, per: int) -> list[int]:
-    """`per` numbers of so many bits in each word, the first in its lowest bits."""
-    groups = (numbers[i : i + per] for i in range(0, len(numbers), per))
-    return [sum(number << (bits * place) for place, number in enumerate(group)) for group in groups]
 
 
 def _data(job: _Job) -> dict[str, Any]:
@@ -429,14 +423,6 @@ def _data(job: _Job) -> dict[str, Any]:
         },
         "array": array,
     }
-
-
-def data_array(rows: Float32Array, numbers: IntArray) -> Float32Array:
-    """Records [R, 4] and whole numbers [M] after them as texels, [rows, DATA_WIDTH, 4]."""
-    flat = np.concatenate([rows.ravel(), numbers.astype(np.float32)])
-    padded = np.zeros(-(-len(flat) // (4 * DATA_WIDTH)) * 4 * DATA_WIDTH, np.float32)
-    padded[: len(flat)] = flat
-    return padded.reshape(-1, DATA_WIDTH, 4)
 
 
 def _loop(job: _Job, form: Form, tiles: Tiles | None = None) -> dict[str, Any]:
@@ -481,31 +467,6 @@ def _grid_part(job: _Job, tiles: Tiles) -> dict[str, Any]:
         "place": expression(grid_point(P, low, cells), job.dialect),
         "coarsest": literal(COARSEST),
     }
-
-
-def table_rows(scene: Scene) -> list[list[str]]:
-    """The text of each vec4 of its records, [stride][shapes]."""
-    table = records(scene, form_of(scene))
-    return [[_vec4(row) for row in rows.tolist()] for rows in table.swapaxes(0, 1)]
-
-
-def _vec4(values: list[float]) -> str:
-    return f"vec4({','.join(short(value) for value in values)})"
-
-
-def short(value: float) -> str:
-    """A number in a GLSL constructor: the shortest text that reads back as the same float32."""
-    text = literal(value)
-    return (
-        text.removesuffix(".0").replace("0.", ".", 1)
-        if text.lstrip("-").startswith("0.")
-        else (text.removesuffix(".0"))
-    )
-
-
-def _ivec4s(numbers: list[int]) -> list[str]:
-    padded = numbers + [0] * (-len(numbers) % 4)
-    return [f"ivec4({','.join(map(str, padded[i : i + 4]))})" for i in range(0, len(padded), 4)]
 
 
 # --- packed: a stream of bits -------------------------------------------------------------------------------

@@ -15,7 +15,8 @@ from sdf2vec.export import packing
 from sdf2vec.export.exported import Exported
 from sdf2vec.export.layouts import FILE, MODULE, OLD, TEXT_LIMIT, choose
 from sdf2vec.export.options import Options
-from sdf2vec.export.shader import files_beside, shader, short, words_of
+from sdf2vec.export.shader import files_beside, shader
+from sdf2vec.export.table_text import short, words_of
 from sdf2vec.export.tiles import COARSEST, bin_layers, scene_grid
 from sdf2vec.render import reference
 from sdf2vec.render.reference import group_coverage
