@@ -91,10 +91,11 @@ $(VENV)/.installed-test: pyproject.toml $(VENV)/.torch
 	$(PIP) install -e '.[test]'
 	@touch $@
 
-# What exports are tried in: a Shadertoy client in an environment of its own (it wants another wgpu), three.js, SVGO.
+# What exports are tried in: a Shadertoy client in an environment of its own (it wants another wgpu), three.js, SVGO;
+# and geometrize, which benches can set beside.
 $(VENV)/.installed-clients: Makefile $(VENV)/.torch | engines
 	$(BIN)/python -m venv $(VENV)/shadertoy
 	$(VENV)/shadertoy/bin/python -m pip --disable-pip-version-check install wgpu-shadertoy==0.2.0 wgpu==0.23.0
 	mkdir -p $(VENV)/npm
-	if command -v npm >/dev/null; then npm install --silent --no-audit --no-fund --prefix $(VENV)/npm three@0.170.0 svgo@4.1.0; fi
+	if command -v npm >/dev/null; then npm install --silent --no-audit --no-fund --prefix $(VENV)/npm three@0.170.0 svgo@4.1.0 geometrizejs@0.0.19 pngjs@7.0.0; fi
 	@touch $@

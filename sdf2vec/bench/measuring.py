@@ -91,7 +91,7 @@ def measured(
         run = took(run, method.peer.command(call))
         if run.error or not target.exists():
             return replace(run, error=run.error or "wrote nothing"), _nothing(source)
-        return _of_svg(run, method.peer.mend(target.read_text("utf-8"), call), source)
+        return _of_svg(run, target.read_text("utf-8"), source)
 
 
 def worker(*arguments: object) -> list[str]:

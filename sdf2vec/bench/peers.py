@@ -1,4 +1,4 @@
-"""Other programs that make a picture of shapes: how each is found and called, and what its SVG needs to be drawn.
+"""Other programs that make a picture of shapes: how each is found and called.
 
 Figures of programs that are not on the machine are those that were published or measured elsewhere, and are marked so.
 """
@@ -7,7 +7,6 @@ from __future__ import annotations
 
 import json
 import os
-import re
 import shutil
 import subprocess
 import sys
@@ -20,7 +19,7 @@ from typing import NamedTuple
 
 from ..errors import Sdf2vecError
 
-SVG = "http://www.w3.org/2000/svg"
+MODULES = Path(sys.prefix, "npm", "node_modules")  # where `make test` puts them
 
 
 class Call(NamedTuple):
@@ -51,8 +50,8 @@ class Peer:
     """A program: `programs` are the names it is found by; `command` calls it such that it writes an SVG.
 
     `counts`: whether it is told a number of shapes; `grows`: whether it lays one on the other, a line of its SVG each,
-    so that what fewer would be is the same without the last ones. `mend`: what its SVG needs before a renderer takes
-    it. `package`: of Python, which does instead of a program.
+    so that what fewer would be is the same without the last ones. `package`: of Python, which does instead of a
+    program. `modules`: of npm, which the program needs.
     """
 
     about: str
@@ -60,11 +59,15 @@ class Peer:
     command: Callable[[Call], list[str]]
     counts: bool = True
     grows: bool = False
-    mend: Callable[[str, Call], str] = lambda svg, call: svg
     package: str = ""
+    modules: tuple[str, ...] = ()
 
     def found(self, given: str | None = None) -> str | None:
-        """Where the program is: as given, this Python where it has the package, or as the system finds it."""
+        """Where the program is: as given, this Python where it has the package, or as the system finds it; nowhere
+        without its modules.
+        """
+        if not all((MODULES / module).is_dir() for module in self.modules):
+            return None
         if not given and self.package and find_spec(self.package):
             return sys.executable
         names = (given,) if given else self.programs
@@ -89,9 +92,25 @@ def _primitive(mode: int) -> Callable[[Call], list[str]]:
     return command
 
 
+# It begins with the picture's mean colour, which its SVG does not have.
+GEOMETRIZE = """
+const fs = require("fs"), [modules, source, target, count] = process.argv.slice(1);
+const { PNG } = require(`${modules}/pngjs`);
+const { Bitmap, ImageRunner, ShapeTypes, SvgExporter } = require(`${modules}/geometrizejs`);
+const { width, height, data } = PNG.sync.read(fs.readFileSync(source));
+const sums = [0, 0, 0].map((sum, c) => data.reduce((all, value, i) => (i % 4 === c ? all + value : all), sum));
+const [r, g, b] = sums.map((sum) => Math.round(sum / (width * height)));
+const ground = (r << 24) | (g << 16) | (b << 8) | 255;
+const runner = new ImageRunner(Bitmap.createFromByteArray(width, height, data), ground);
+const options = { shapeTypes: [ShapeTypes.ROTATED_ELLIPSE] };
+const shapes = Array.from({ length: +count }, () => runner.step(options)).flat();
+const below = `<rect width="${width}" height="${height}" fill="rgb(${r},${g},${b})"/>`;
+fs.writeFileSync(target, SvgExporter.export(shapes, width, height).replace(/<svg[^>]*>/, (svg) => svg + below));
+"""
+
+
 def _geometrize(call: Call) -> list[str]:
-    shapes = ("--iterations", str(call.shapes), "--shapeTypes", "rotated_ellipse")
-    return [call.program, "--input", call.source, "--output", call.target, "--format", "svg", *shapes]
+    return [call.program, "-e", GEOMETRIZE, str(MODULES), call.source, call.target, str(call.shapes)]
 
 
 def _sqip(call: Call) -> list[str]:
@@ -115,13 +134,7 @@ def _vtracer(**options: int | str) -> Callable[[Call], list[str]]:
     return command
 
 
-# --- what renderers need ------------------------------------------------------------------------------------
-
-
-def _namespaced(svg: str, call: Call) -> str:
-    """geometrize names a namespace that is none."""
-    return re.sub(r'xmlns="[^"]*"', f'xmlns="{SVG}"', svg, count=1)
-
+# --- the programs ------------------------------------------------------------------------------------------
 
 FRUGAL: dict[str, int | str] = {
     "mode": "polygon",
@@ -137,7 +150,11 @@ PEERS: dict[str, Peer] = {
         "fogleman/primitive, rotated ellipses", ("primitive",), _primitive(7), grows=True
     ),
     "geometrize": Peer(
-        "geometrizejs-cli, rotated ellipses", ("geometrize",), _geometrize, grows=True, mend=_namespaced
+        "geometrizejs, rotated ellipses",
+        ("node",),
+        _geometrize,
+        grows=True,
+        modules=("geometrizejs", "pngjs"),
     ),
     "vtracer": Peer(
         "vtracer at its defaults, paths", ("vtracer",), _vtracer(), counts=False, package="vtracer"
@@ -184,7 +201,7 @@ def drawn_by(
         if done.returncode or not target.exists():
             raise Sdf2vecError(f"{name} failed: {done.stderr or done.stdout}")
         spent = sum(after[2:4]) - sum(before[2:4])  # of children
-        return peer.mend(target.read_text(encoding="utf-8"), call), spent
+        return target.read_text(encoding="utf-8"), spent
 
 
 def programs_of(given: list[str]) -> dict[str, str]:

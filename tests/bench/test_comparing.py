@@ -89,7 +89,7 @@ def results(tmp_path_factory):
     folder = tmp_path_factory.mktemp("bench")
     (folder / "disc.png").write_bytes(encode_png(picture().pixels))
     grey = program(folder, f"echo run >> {folder}/calls; echo '{GREY}' > \"$4\"")
-    methods = ("--methods", "draft,primitive,geometrize", "--shapes", "5", "--peer", f"primitive={grey}")
+    methods = ("--methods", "draft,primitive,sqip", "--shapes", "5", "--peer", f"primitive={grey}")
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(measuring, "warm_up", lambda method: None)  # takes a process more
         assert bench(folder / "disc.png", *methods, "-o", folder / "out") == 0
@@ -117,7 +117,7 @@ def test_runs_are_not_done_twice(results):
 def test_runs_are_scored(results):
     found = json.loads((results / "out" / "results.json").read_text())
     ours, grey = found["runs"]
-    assert found["absent"] == ["geometrize"]
+    assert found["absent"] == ["sqip"]
     assert (ours["method"], grey["method"]) == ("draft", "primitive")
     flat = np.full((32, 48, 4), (128 / 255,) * 3 + (1.0,), np.float32)
     assert grey["psnr"] == pytest.approx(measuring.score(flat, load(results / "disc.png")).psnr, abs=1e-3)
