@@ -40,11 +40,16 @@ RESOLUTION = 128  # pixels squared, where it is seen which shapes matter least
 
 
 class Probe(NamedTuple):
-    """One sort of shapes: how to fit them, how many there may be, what PSNR is to be had."""
+    """One sort of shapes: how to fit them, how many there may be, and how near so many of them came, in dB."""
 
     settings: Settings
     wanted: int
-    hoped: float  # dB
+    count: int
+    near: float
+
+    def hoped(self, slope: float) -> float:
+        """What PSNR is to be had where twice as many shapes bring so much."""
+        return self.near + slope * math.log2(max(self.wanted, 1e-3) / self.count)
 
 
 def within(picture: Picture, settings: Settings, share: Share, callback: Callback) -> tuple[Scene, float]:
@@ -56,7 +61,7 @@ def within(picture: Picture, settings: Settings, share: Share, callback: Callbac
     best, near = (nothing, empty), psnr_of(nothing, picture)
     if empty >= 1.0:
         return best
-    probes = sorted(_probes(picture, settings, share, callback), key=lambda probe: -probe.hoped)
+    probes = _probes(picture, settings, share, callback)
     chancy = probes[0].wanted <= CHANCY
     for probe in probes[: NEAREST if chancy else 1]:
         count = probe.wanted
@@ -100,18 +105,22 @@ def _sorts(settings: Settings) -> Iterator[Settings]:
 
 
 def _probes(picture: Picture, settings: Settings, share: Share, callback: Callback) -> list[Probe]:
-    """What each sort promises: the more there is room for, the more of it are tried."""
+    """The sorts, the most promising first: the more there is room for, the more of each are tried."""
     least, most = PROBED
     sorts = list(_sorts(settings))
     first = _probe(sorts[0], picture, share, callback, least)
     count = min(max(first.wanted // 2, least), most)
     begun = [first] if count == least else []
     probes = begun + [_probe(sort, picture, share, callback, count) for sort in sorts[len(begun) :]]
+    slope = SLOPE
+    if count > least:  # where more bring less than usual, a sort of many has less to promise
+        slope = min(slope, (probes[0].near - first.near) / math.log2(count / first.count))
     if count < most:
-        for index, (sort, wanted, _) in enumerate(probes):
-            if wanted > FAR * count:
-                probes[index] = _probe(sort, picture, share, callback, min(wanted // 2, most))
-    return probes
+        for index, probe in enumerate(probes):
+            if probe.wanted > FAR * count:
+                more = min(probe.wanted // 2, most)
+                probes[index] = _probe(probe.settings, picture, share, callback, more)
+    return sorted(probes, key=lambda probe: -probe.hoped(slope))
 
 
 def _probe(settings: Settings, picture: Picture, share: Share, callback: Callback, count: int) -> Probe:
@@ -121,8 +130,7 @@ def _probe(settings: Settings, picture: Picture, share: Share, callback: Callbac
     least, most = share(replace(few, layers=few.layers[:1])), share(few)
     each = max((most - least) / max(count - 1, 1), 1e-9)
     wanted = 1 + math.floor((1.0 - least) / each) if least <= 1.0 else 0
-    hoped = _near(share, few, picture) + SLOPE * math.log2(max(wanted, 1e-3) / count)
-    return Probe(settings, min(max(wanted, 1), settings.most), hoped)
+    return Probe(settings, min(max(wanted, 1), settings.most), count, _near(share, few, picture))
 
 
 def _trimmed(scene: Scene, view: View, share: Share, each: float, taken: float) -> tuple[Scene, float]:
