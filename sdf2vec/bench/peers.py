@@ -105,7 +105,8 @@ const runner = new ImageRunner(Bitmap.createFromByteArray(width, height, data), 
 const options = { shapeTypes: [ShapeTypes.ROTATED_ELLIPSE] };
 const shapes = Array.from({ length: +count }, () => runner.step(options)).flat();
 const below = `<rect width="${width}" height="${height}" fill="rgb(${r},${g},${b})"/>`;
-fs.writeFileSync(target, SvgExporter.export(shapes, width, height).replace(/<svg[^>]*>/, (svg) => svg + below));
+const svg = SvgExporter.export(shapes, width, height).replace("</svg>", "\\n</svg>");
+fs.writeFileSync(target, svg.replace(/<svg[^>]*>/, (opened) => opened + below));
 """
 
 

@@ -40,16 +40,16 @@ RESOLUTION = 128  # pixels squared, where it is seen which shapes matter least
 
 
 class Probe(NamedTuple):
-    """One sort of shapes: how to fit them, how many there may be, and how near so many of them came, in dB."""
+    """One sort of shapes: how to fit them, how many there may be; how many were tried, how near they came, in dB."""
 
     settings: Settings
     wanted: int
-    count: int
+    tried: int
     near: float
 
     def hoped(self, slope: float) -> float:
         """What PSNR is to be had where twice as many shapes bring so much."""
-        return self.near + slope * math.log2(max(self.wanted, 1e-3) / self.count)
+        return self.near + slope * math.log2(self.wanted / self.tried)
 
 
 def within(picture: Picture, settings: Settings, share: Share, callback: Callback) -> tuple[Scene, float]:
@@ -114,7 +114,7 @@ def _probes(picture: Picture, settings: Settings, share: Share, callback: Callba
     probes = begun + [_probe(sort, picture, share, callback, count) for sort in sorts[len(begun) :]]
     slope = SLOPE
     if count > least:  # where more bring less than usual, a sort of many has less to promise
-        slope = min(slope, (probes[0].near - first.near) / math.log2(count / first.count))
+        slope = min(slope, (probes[0].near - first.near) / math.log2(count / first.tried))
     if count < most:
         for index, probe in enumerate(probes):
             if probe.wanted > FAR * count:
