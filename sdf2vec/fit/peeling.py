@@ -23,6 +23,7 @@ from ..layer import LOOK, Slot, Structure, row_width
 from ..render.reference import rows_coverage
 from ..render.tensors import Group, SceneTensors
 from .candidates import Mask, Opening, Proposer, own_cover
+from .covering import Covering, joined_sharply, parted
 from .initialization import straight
 from .joining import Search, inserted
 from .region_graph import Regions
@@ -85,6 +86,11 @@ class Outlined:
         return len(self.layer.structure) > 1
 
     @property
+    def layers(self) -> list[Group]:
+        """The same as layers of one shape each, if nothing is cut out of it."""
+        return parted(self.layer) if all(part.adds for part in self.layer.structure) else [self.layer]
+
+    @property
     def is_opaque(self) -> bool:
         return self.overlay.opacity == 1.0
 
@@ -119,7 +125,7 @@ def peeled(scene: SceneTensors, views: Sequence[View], search: Search) -> SceneT
     outlines = Outlines(scene, [Surroundings.of(scene, 0, view) for view in views], search)
     found: list[Group] = []
     while len(found) < MOST and not outlines.are_hopeless and (top := outlines.topmost(regions)):
-        found += [each.layer for each in top if not each.soft]
+        found += [layer for each in top if not each.soft for layer in each.layers]
         if top[0].is_opaque:
             regions = regions.hidden(np.any([each.overlay.inside for each in top], axis=0))
         else:
@@ -176,7 +182,7 @@ class Area:
 
     def _is_bitten(self, layer: Group) -> bool:
         """Whether a shape that is cut out of another goes beyond its edge."""
-        if len(layer.structure) < 2:
+        if len(layer.structure) < 2 or layer.structure[1].adds:
             return False
         base, cut = (own_cover(layer, index, self.around) for index in (0, 1))
         return bool((cut * (1.0 - base)).sum() > BITTEN * cut.sum())
@@ -382,7 +388,22 @@ def _outlined(area: Area, fine: Area, search: Search) -> Outlined | None:
         for base in _distinct(wide)[:BASES]
         for tried in proposer.candidates([area.cut(base.layer)], area.around)[0]
     ]
-    return _sharpest([best, *cut], area, proposer)[0]
+    best = _sharpest([best, *cut], area, proposer)[0]
+    return best if best.is_good or area.overlay.opacity < 1.0 else _together(area, proposer) or best
+
+
+def _together(area: Area, proposer: Proposer) -> Outlined | None:
+    """Several shapes that are good together, no more than are worth their numbers; None if none are."""
+    place = area.opening()
+    region = Covering(area.inside, area.known, place.color, place.layer, area.around, proposer)
+    good: list[Outlined] = []
+    for layer in region.layers():
+        sharp = proposer.sharpened(layer, place.mask, area.around, STEPS)
+        found = area.outlined(joined_sharply(sharp))
+        good += [found] if found.is_good else []
+        if found.off < LEAST_OFF:
+            break
+    return min(good, key=lambda each: each.score, default=None)
 
 
 def _distinct(ranked: Sequence[Outlined]) -> list[Outlined]:

@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 import torch
 
+from sdf2vec.api import render
 from sdf2vec.fit import descents, peeling, pruning, sparse
 from sdf2vec.fit.auto import Drawing
 from sdf2vec.fit.drawings import Drawn
@@ -155,9 +158,49 @@ def test_a_ring_is_one_layer_and_what_bites_into_a_disc_is_another():
     ]
 
 
-def test_what_no_shape_has_the_outline_of_is_left():
+def test_what_no_few_shapes_have_the_outline_of_is_left():
+    x, y = points()
+    flower = np.hypot(x - 48, y - 48) < 30 + 6 * np.sin(9 * np.arctan2(y - 48, x - 48))
+    assert not apart(painted((flower, BLUE, 1.0)))
+
+
+def test_a_letter_is_its_bars():
+    """Two that meet; and the same where a disc hides where they do."""
     letter = box(20, 20, 36, 80) | box(20, 64, 70, 80)
-    assert not apart(painted((letter, BLUE, 1.0)))
+    for on_top in ((), ((disc(30, 70, 9), RED, 1.0),)):
+        under = apart(painted((letter, BLUE, 1.0), *on_top))[: 2 if on_top else None]
+        assert [layer.shapes[0].kind for layer in under] == ["box", "box"]
+        assert all(layer.shapes[0].color == pytest.approx(BLUE, abs=0.01) for layer in under)
+        covered = reference(under) > 0.5
+        assert np.abs(covered.astype(float) - letter[::FINER, ::FINER]).mean() < 0.01
+
+
+def reference(layers):
+    """How much layers cover together, [SIDE, SIDE]: white on black."""
+    white = [replace(one, shapes=(replace(one.shapes[0], color=(1, 1, 1)),)) for one in layers]
+    return render(Scene(SIDE, SIDE, tuple(white), (0, 0, 0)))[..., 0]
+
+
+def test_a_cross_on_a_cross_is_four_bars():
+    """To the picture's ends, as on flags; of the lower one is seen what is around the other."""
+    wide, narrow = (box(32 - w, -9, 32 + w, 105) | box(-9, 48 - w, 105, 48 + w) for w in (12, 6))
+    layers = apart(painted((wide, RED, 1.0), (narrow, BLUE, 1.0)), 56)
+    assert [layer.shapes[0].kind for layer in layers] == ["box"] * 4
+    halves = sorted(round(min(layer.shapes[0].parameters[2:4]) * SIDE, 1) for layer in layers)
+    assert halves == pytest.approx([6, 6, 12, 12], abs=0.2)
+
+
+def test_a_cloud_is_a_few_round_shapes():
+    cloud = disc(34, 54, 15) | disc(50, 44, 19) | disc(68, 56, 13) | box(34, 54, 68, 69)
+    layers = apart(painted((cloud, BLUE, 1.0)))
+    assert len(layers) in (3, 4)
+    assert np.abs(reference(layers) - mean_of(cloud)).max() < 0.6
+    assert np.abs(reference(layers) - mean_of(cloud)).mean() < 0.003
+
+
+def mean_of(mask):
+    """How much of each pixel is in a mask, [SIDE, SIDE]."""
+    return mask.reshape(SIDE, FINER, SIDE, FINER).mean(axis=(1, 3))
 
 
 def test_a_hole_of_another_shape_is_seen_where_the_picture_is_large():
