@@ -26,7 +26,7 @@ from ..render.tensors import Group
 from ..units import COLOR, FALLOFF, OPACITY, SMOOTHNESS, Placed
 from .initialization import start_of
 from .laying import Laid
-from .levenberg import Numbers, Problem, descend
+from .levenberg import Dense, Numbers, Problem, descend
 from .surroundings import Surroundings
 
 ellipses_of: Callable[..., Any] = deferred("sdf2vec.fit.regions", "ellipses")  # scikit-image
@@ -360,9 +360,18 @@ def _rows(structure: Structure, placed: Placed) -> torch.Tensor:
 
 
 def _misses(structure: Structure, masks: Sequence[Mask], around: Surroundings, blur: float) -> Problem:
-    """How far the coverage of each layer of one white shape is from its mask."""
+    """How far the coverage of each layer of one white shape is from its mask; of several shapes without kernels, for
+    there are too many structures to compile some for a look at each.
+    """
     strengths = torch.stack([mask.strength for mask in masks])[:, None]
     amounts = torch.stack([mask.amount for mask in masks])[:, None]
     x, y, pixel = around.points
-    points = x, y, pixel * blur
-    return Laid(structure, around.scene.compositing, points, torch.zeros(1, len(x)), strengths, amounts)
+    points, compositing = (x, y, pixel * blur), around.scene.compositing
+    if any(part.adds for part in structure[1:]):
+
+        def wrong(rows: torch.Tensor) -> torch.Tensor:
+            cover, _ = rows_coverage(structure, rows, compositing, *points)
+            return cover[:, None] * strengths - amounts
+
+        return Dense(wrong, len(x))
+    return Laid(structure, compositing, points, torch.zeros(1, len(x)), strengths, amounts)

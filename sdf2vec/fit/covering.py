@@ -30,7 +30,11 @@ STARTS = 3  # of a kind of shape
 STRICT = 4.0  # how much it matters what is covered too much, against what is not covered
 # share of a region that may be left by all parts, if each covers as much of what is left as the last did
 LEFT = 0.02
-BOX, HARDLY = "box", 0.96  # what bars are, and of what others cover so much is enough for them
+BOX = "box"
+SIMPLE, OTHER = (
+    {"circle": 1.0, BOX: 0.96},
+    0.92,
+)  # how much what a kind covers counts: the simpler is the likelier
 
 
 class Bar(NamedTuple):
@@ -85,7 +89,7 @@ class Covering:
             for _, made in self.proposer.optima(kind, [place] * 2, starts, self.around, STARTS):
                 cover = own_cover(made, index, self.around)
                 gain = float((cover * (left - STRICT * too_much)).sum())
-                gain *= 1.0 if kind == BOX else HARDLY
+                gain *= SIMPLE.get(kind, OTHER)
                 if gain > most:
                     best, most = made, gain
         return joined_sharply(best) if most else None

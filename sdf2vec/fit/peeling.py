@@ -22,7 +22,7 @@ from ..blend import SUBTRACTION
 from ..layer import LOOK, Slot, Structure, row_width
 from ..render.reference import rows_coverage
 from ..render.tensors import Group, SceneTensors
-from .candidates import Mask, Opening, Proposer, own_cover
+from .candidates import Mask, Opening, Proposer, own_cover, reductions
 from .covering import Covering, joined_sharply, parted
 from .initialization import straight
 from .joining import Search, inserted
@@ -40,6 +40,7 @@ MARGIN = 0.2, 4  # around a region: share of its longer side, and pixels
 STARTS, BASES = 6, 3  # of a kind of shape; shapes from which others are cut
 EXACT = 0.36  # pixels by which an outline is off in the mean, at most
 LEAST_OFF, FINELY_OFF = 0.15, 0.08  # below that an outline is no better; in the finest surroundings
+TOGETHER = 0.27  # the same of several shapes: what round ones that have the very outline come to
 GOOD = 0.25  # share of a layer that its shape may miss, at most
 GROSSLY = 0.01  # share of it that may be wrong where the largest surroundings show it, by more than an edge
 HIDDEN = 0.5  # share of another region, at most, that a layer on top covers
@@ -393,17 +394,22 @@ def _outlined(area: Area, fine: Area, search: Search) -> Outlined | None:
 
 
 def _together(area: Area, proposer: Proposer) -> Outlined | None:
-    """Several shapes that are good together, no more than are worth their numbers; None if none are."""
+    """Several shapes that have the very outline together; None if none have: what they miss would take many more."""
     place = area.opening()
+
+    def sharp(layer: Group) -> Outlined:
+        moved = proposer.sharpened(layer, place.mask, area.around, STEPS)
+        return area.outlined(joined_sharply(moved))
+
     region = Covering(area.inside, area.known, place.color, place.layer, area.around, proposer)
-    good: list[Outlined] = []
     for layer in region.layers():
-        sharp = proposer.sharpened(layer, place.mask, area.around, STEPS)
-        found = area.outlined(joined_sharply(sharp))
-        good += [found] if found.is_good else []
-        if found.off < LEAST_OFF:
-            break
-    return min(good, key=lambda each: each.score, default=None)
+        found = [sharp(layer)]
+        if found[0].off < EXACT:  # what was laid first may be needless, or keep the others from their places
+            found += map(sharp, reductions(found[0].layer))
+        good = [each for each in found if each.off < TOGETHER]
+        if good:
+            return min(good, key=lambda each: (len(each.layer.structure), each.off))
+    return None
 
 
 def _distinct(ranked: Sequence[Outlined]) -> list[Outlined]:
