@@ -7,11 +7,13 @@ from importlib.util import find_spec
 
 import pytest
 
+from sdf2vec.bench.peers import PEERS
 from sdf2vec.engines import ENGINES, glslang, svgo
 
 MISSING = {name: engine.missing for name, engine in ENGINES.items()} | {
     "glslang": glslang.missing,
     "svgo": svgo.missing,
+    "geometrize": lambda: None if PEERS["geometrize"].found() else "geometrizejs is not here: make test",
     "triton": lambda: None if find_spec("triton") else "not installed",
 }
 

@@ -114,7 +114,8 @@ def _probes(picture: Picture, settings: Settings, share: Share, callback: Callba
     probes = begun + [_probe(sort, picture, share, callback, count) for sort in sorts[len(begun) :]]
     slope = SLOPE
     if count > least:  # where more bring less than usual, a sort of many has less to promise
-        slope = min(slope, (probes[0].near - first.near) / math.log2(count / first.tried))
+        gained = max(probes[0].near - first.near, 0.0)
+        slope = min(slope, gained / math.log2(count / first.tried))
     if count < most:
         for index, probe in enumerate(probes):
             if probe.wanted > FAR * count:

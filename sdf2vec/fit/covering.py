@@ -31,10 +31,8 @@ STRICT = 4.0  # how much it matters what is covered too much, against what is no
 # share of a region that may be left by all parts, if each covers as much of what is left as the last did
 LEFT = 0.02
 BOX = "box"
-SIMPLE, OTHER = (
-    {"circle": 1.0, BOX: 0.96},
-    0.92,
-)  # how much what a kind covers counts: the simpler is the likelier
+# how much it counts what a shape covers: a simple kind is the likelier
+SIMPLE, OTHER = {"circle": 1.0, BOX: 0.96}, 0.92
 
 
 class Bar(NamedTuple):

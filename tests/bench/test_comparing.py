@@ -4,6 +4,7 @@ import json
 import stat
 import subprocess
 import sys
+from xml.etree.ElementTree import fromstring
 
 import numpy as np
 import pytest
@@ -12,7 +13,7 @@ from sdf2vec.bench import measuring
 from sdf2vec.bench.comparing import Plan, compare
 from sdf2vec.bench.methods import method_of, methods_of
 from sdf2vec.bench.pareto import Point, front
-from sdf2vec.bench.peers import PEERS, Call, programs_of
+from sdf2vec.bench.peers import PEERS, Call, drawn_by, programs_of
 from sdf2vec.engines import chromium
 from sdf2vec.errors import Sdf2vecError
 from sdf2vec.image import encode_png, load
@@ -66,6 +67,18 @@ def test_programs_are_told_where_to_write(name):
     command = PEERS[name].command(Call("/opt/it", "in.png", "out.svg", (48, 32), 77))
     assert {"/opt/it", "in.png", "out.svg"} <= set(command)
     assert ("77" in command) == PEERS[name].counts
+
+
+def test_geometrize_lays_one_ellipse_a_line_on_the_mean_colour(require_engine):
+    require_engine("geometrize")
+    pixels = np.zeros((12, 16, 3), np.float32)
+    pixels[:, :8] = 0.5, 0.25, 1.0
+    svg, _ = drawn_by("geometrize", encode_png(pixels), (16, 12), 3)
+    *head, one, two, three, end = svg.strip().splitlines()
+    assert 'fill="rgb(64,32,128)"' in head[-1]
+    assert all(line.count("<ellipse") == 1 for line in (one, two, three))
+    assert end == "</svg>"
+    fromstring(svg)
 
 
 def test_programs_that_are_none_are_refused():
