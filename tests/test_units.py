@@ -90,6 +90,10 @@ def test_what_is_positive_is_a_pixel_at_least_and_signed_colours_go_below_0():
     assert (colors[0].tolist(), opacity.item()) == ([-1.0] * 3, -0.5)
 
 
+# Lengths grow with the sixteenth power; ends are said with four decimals.
+HALF_GROWN = ((round(0.001 ** (1 / 16), 4) + round(8.001 ** (1 / 16), 4)) / 2) ** 16 - 0.001
+
+
 def decoded(unit: Unit, fraction: float, width: int = 1) -> list[float]:
     """The number at a fraction, in a box from (0.5, −1) of 3 by 4, with ranges 0..8 of everything."""
     corner, box = (operation("vec2", *map(const, pair)) for pair in ((0.5, -1.0), (3.0, 4.0)))
@@ -111,8 +115,8 @@ def decoded(unit: Unit, fraction: float, width: int = 1) -> list[float]:
         (units.DIRECTION, 2, [4.0, 4.0]),
         (units.COLOR, 3, [4.0, 4.0, 4.0]),
         (units.OPACITY, 1, [4.0]),
-        (units.FALLOFF, 1, [((0.001 ** (1 / 16) + 8.001 ** (1 / 16)) / 2) ** 16 - 0.001]),
-        (units.SMOOTHNESS, 1, [((0.001 ** (1 / 16) + 8.001 ** (1 / 16)) / 2) ** 16 - 0.001]),
+        (units.FALLOFF, 1, [HALF_GROWN]),
+        (units.SMOOTHNESS, 1, [HALF_GROWN]),
     ],
 )
 def test_half_of_every_codec(unit, width, wanted):

@@ -76,6 +76,11 @@ class Layout:
     boxes: Boxes = OWN
     is_grey: bool = False
 
+    @property
+    def is_plain(self) -> bool:
+        """Whether all layers are as long as each other and are drawn by one statement."""
+        return self.boxes.is_shared and len(self.variants) == 1 and not self.joins
+
     def width(self, parameter: Parameter) -> int:
         """How many fractions say a parameter."""
         return 1 if self.is_grey and parameter.unit is COLOR else parameter.width

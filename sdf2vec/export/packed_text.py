@@ -21,22 +21,18 @@ from .records import FIELD, Form, Variant, drawn_by, joined_by
 
 
 class PackedText:
-    """The text of a packed scene; `motion` is added to distances. What is called at one place only is written there.
-
-    `is_plain`: all layers are as long as each other and are drawn by one statement.
-    """
+    """The text of a packed scene; `motion` is added to distances. What is called at one place only is written there."""
 
     def __init__(self, packed: Packed, scene: Scene, dialect: Dialect, motion: Expr = STILL) -> None:
         self.packed, self.dialect = packed, dialect
         self.layout = layout = packed.layout
         self.is_shared = layout.boxes.is_shared
-        self.is_plain = self.is_shared and len(layout.variants) == 1 and not layout.joins
         form = Form(layout.variants, layout.joins, scene.compositing)
         opacity, falloff = (self._field(parameter) for parameter in LOOK)
         drawn = drawn_by(form, var("float(kind)"), opacity, falloff, motion)
         fields = [self._at(variant) for variant in layout.variants]
         joins = [joined_by(layout.joins, var("float(join)"), self._smoothness())] if layout.joins else []
-        if self.is_plain:
+        if layout.is_plain:
             drawn, fields = substitute(drawn, {FIELD: self._within_shared(fields[0])}), []
         once = called_once([drawn, *fields, *joins])
         self.drawn, *self.fields = (opened(formula, once) for formula in (drawn, *fields))
@@ -70,7 +66,7 @@ class PackedText:
         return {
             **{name: self._say(value) for name, value in values.items()},
             "drawn": statements("c = {};", self.drawn, self.dialect),
-            "plain": self.is_plain,
+            "plain": self.layout.is_plain,
             "words": packed.words,
             "word": WORD,
             "end": packed.bits,
@@ -87,7 +83,7 @@ class PackedText:
             "most": layout.most()[1],
             "variants": [
                 (*layout.counts(variant), statements("return {};", field, self.dialect))
-                for variant, field in zip(layout.variants, self.fields, strict=not self.is_plain)
+                for variant, field in zip(layout.variants, self.fields, strict=not self.layout.is_plain)
             ],
             "color": bits.color,
             **self._joined_part(),
@@ -131,7 +127,7 @@ class PackedText:
         """Colour and field of a shape whose colours are at the place `at`; the others are in `v`, or behind."""
         kind, paint = KINDS[variant.kind], PAINTS[variant.paint]
         bits, colors, places = self.packed.precision.color, 0, 0
-        start = self.layout.before_shapes(self.packed.precision) if self.is_plain else 0
+        start = self.layout.before_shapes(self.packed.precision) if self.layout.is_plain else 0
         values: dict[Parameter, Expr] = {}
         for parameter in by_precision((*paint.parameters, *kind.parameters)):
             fractions = []
@@ -153,7 +149,7 @@ class PackedText:
 
     def _part(self, further: int, bits: int) -> Expr:
         """The fraction of a shape that is so many bits further, where all layers are as long from their start."""
-        return _part("start" if self.is_plain else "at", further, bits)
+        return _part("start" if self.layout.is_plain else "at", further, bits)
 
     def _say(self, value: Expr) -> str:
         return expression(value, self.dialect)

@@ -55,7 +55,9 @@ BLOCKS, MANY = 4, 256  # of cells along a side, where there are more layers than
 LEAST_BITS, MOST_BITS = 4, 24  # of a fraction; a float holds no more
 FEWER = 5  # bits that all layers begin without, when the fewest are looked for
 BRIEF = 1e-3  # scene units: the step of the corner and the side of a single box
-SHORT = 128  # words that a shader reads without a window: more take compilers long
+# words of layers that are all alike, up to which a shader reads them without a window: some compilers copy all of them
+# wherever one is read
+SHORT = 48
 ROUNDS = 60
 BLAME = (
     0.97  # of the largest share that a layer has in what is off at a pixel: who has so much gets more bits
@@ -92,8 +94,8 @@ class Packed:
 
     @property
     def is_short(self) -> bool:
-        """Whether a shader may look at all words wherever it reads one: some compilers copy them all."""
-        return len(self.words) <= SHORT
+        """Whether a shader may look at all words wherever it reads one."""
+        return self.layout.is_plain and len(self.words) <= SHORT
 
 
 # --- what a fraction stands for ----------------------------------------------------------------------------
@@ -327,10 +329,11 @@ class Packer:
                 stream.put(value, bits)
             last = stream.bits - self.layout.longest(precision, count)  # where the last shape may begin
         words = stream.words((stream.bits - 1) // WORD + 2)
-        if len(words) > SHORT:
-            window = self.layout.window(precision, least + self.layout.boxes.spread)
-            words = stream.words(last // WORD + window)
-        return Packed(words, stream.bits, self.grid, least, precision, self.ranges, self.layout, error)
+        packed = Packed(words, stream.bits, self.grid, least, precision, self.ranges, self.layout, error)
+        if packed.is_short:
+            return packed
+        window = self.layout.window(precision, least + self.layout.boxes.spread)
+        return replace(packed, words=stream.words(last // WORD + window))
 
     def _layer(
         self, layer: Layer, cells: tuple[int, ...], count: int, precision: Precision
