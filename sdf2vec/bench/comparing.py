@@ -18,6 +18,7 @@ from ..outputs import stem_of
 from . import fronts, page
 from .measuring import Source, measured, source_of
 from .methods import Method, described, method_of
+from .peers import missing
 from .results import Results, begun, hash_of, keep, machine
 
 COLUMN = 168  # pixels across, of a picture of the figure
@@ -59,7 +60,7 @@ def compare(plan: Plan, say: Callable[[str], None]) -> Results:
     hashes = {name: hash_of(path) for name, path in pictures.items()}
     results = begun(plan.folder, Results(machine(), [plan.command], hashes, absent, []))
     for name in absent:
-        say(f"{name}: not on this machine; --peer NAME=PATH tells where it is")
+        say(missing(name))
     tasks = [task for task in _tasks(plan, loaded) if _key(task) not in results.done]
     with tempfile.TemporaryDirectory() as folder:
         sources = {name: source_of(name, picture, Path(folder)) for name, picture in loaded.items()}

@@ -18,8 +18,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 from ..errors import Sdf2vecError
-
-MODULES = Path(sys.prefix, "npm", "node_modules")  # where `make test` puts them
+from ..npm import NODE_MODULES
 
 
 class Call(NamedTuple):
@@ -66,7 +65,7 @@ class Peer:
         """Where the program is: as given, this Python where it has the package, or as the system finds it; nowhere
         without its modules.
         """
-        if not all((MODULES / module).is_dir() for module in self.modules):
+        if not all((NODE_MODULES / module).is_dir() for module in self.modules):
             return None
         if not given and self.package and find_spec(self.package):
             return sys.executable
@@ -111,7 +110,7 @@ fs.writeFileSync(target, svg.replace(/<svg[^>]*>/, (opened) => opened + below));
 
 
 def _geometrize(call: Call) -> list[str]:
-    return [call.program, "-e", GEOMETRIZE, str(MODULES), call.source, call.target, str(call.shapes)]
+    return [call.program, "-e", GEOMETRIZE, str(NODE_MODULES), call.source, call.target, str(call.shapes)]
 
 
 def _sqip(call: Call) -> list[str]:
@@ -171,11 +170,22 @@ PEERS: dict[str, Peer] = {
 }
 
 
+def missing(name: str) -> str:
+    """One line that says that a peer isn't here, and how to get it."""
+    peer = PEERS[name]
+    if peer.modules:
+        how = f"make test puts {' and '.join(peer.modules)} where they are looked for"
+    else:
+        package = f"pip install {peer.package}, or " if peer.package else ""
+        how = f"{package}put its program on the path, or tell a bench by --peer NAME=PATH where it is"
+    return f"{name}: not on this machine; {how}"
+
+
 def required(name: str, programs: Mapping[str, str]) -> str:
     """Where the program of a peer is. Raises Sdf2vecError where it isn't."""
     where = PEERS[name].among(programs)
     if where is None:
-        raise Sdf2vecError(f"{name}: not on this machine; --peer NAME=PATH tells where it is")
+        raise Sdf2vecError(missing(name))
     return where
 
 
@@ -190,8 +200,7 @@ def drawn_by(
     peer = PEERS[name]
     program = peer.found(given)
     if program is None:
-        package = f"pip install {peer.package}, or " if peer.package else ""
-        raise Sdf2vecError(f"{name} is not here: {package}put its program on the path")
+        raise Sdf2vecError(missing(name))
     with tempfile.TemporaryDirectory() as folder:
         source, target = Path(folder, "picture.png"), Path(folder, "picture.svg")
         source.write_bytes(png)

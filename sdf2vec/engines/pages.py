@@ -5,13 +5,13 @@ Each function draws into `width` × `height` pixels and returns float32 `[height
 
 import math
 import os
-import sys
 from pathlib import Path
 
 from playwright.sync_api import Page
 
 from sdf2vec.engines.chromium import opened, probe, screenshot, wait_until
 from sdf2vec.engines.engine import EngineError, Picture
+from sdf2vec.npm import NODE_MODULES
 
 __all__ = ["element", "image", "material", "page", "probe", "probe_three"]
 
@@ -94,5 +94,5 @@ def probe_three() -> None:
 def _three_modules() -> dict[str, str | bytes]:
     """The modules of three.js by name; SDF2VEC_THREE names another folder than where `make engines` puts them."""
     named = os.environ.get("SDF2VEC_THREE")
-    folder = Path(named) if named else Path(sys.prefix, "npm", "node_modules", "three", "build")
+    folder = Path(named) if named else NODE_MODULES / "three" / "build"
     return {path.name: path.read_text() for path in folder.glob("three.*.min.js")}

@@ -2,13 +2,13 @@
 
 import shutil
 import subprocess
-import sys
 from functools import cache
 from pathlib import Path
 
 from sdf2vec.engines.engine import EngineError, answer_of
+from sdf2vec.npm import NODE_MODULES
 
-PLACE = Path(sys.prefix, "npm", "node_modules", ".bin", "svgo")  # where `make test` puts it
+PLACE = NODE_MODULES / ".bin" / "svgo"
 
 
 @cache

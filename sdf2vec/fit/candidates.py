@@ -190,16 +190,19 @@ def _mask(low: torch.Tensor, high: torch.Tensor) -> Mask:
 
 def own_cover(layer: Group, index: int, around: Surroundings) -> torch.Tensor:
     """Coverage [P] of one part of a layer alone."""
-    structure = (Part(layer.structure[index].kind),)
-    columns = [
-        torch.zeros(1, slot.parameter.width)
-        if slot.parameter.unit is COLOR
-        else layer.values[slot if slot.part is None else Slot(index, slot.parameter)]
-        for slot in slots(structure)
-    ]
-    rows = torch.cat(columns, dim=1)[..., None]
-    cover, _ = rows_coverage(structure, rows, around.scene.compositing, *around.points)
+    own = single(layer, index, Part(layer.structure[index].kind))
+    rows = own.rows()[..., None]
+    cover, _ = rows_coverage(own.structure, rows, around.scene.compositing, *around.points)
     return cover[0]
+
+
+def single(layer: Group, index: int, part: Part) -> Group:
+    """One part of a layer as a layer of its own; black where it has no colour."""
+    values = {}
+    for slot in slots((part,)):
+        place = slot if slot.part is None else Slot(index, slot.parameter)
+        values[slot] = layer.values.get(place, torch.zeros(1, slot.parameter.width))
+    return Group((part,), layer.order, values)
 
 
 def _joined(joins: Sequence[str], covers: Sequence[torch.Tensor]) -> torch.Tensor:

@@ -16,11 +16,11 @@ from scipy import ndimage
 
 from ..arrays import BoolArray, Float64Array
 from ..blend import UNION
-from ..layer import JOIN, Part, Slot, slots
+from ..layer import JOIN, Part
 from ..render.tensors import Group
 from ..shapes import KINDS
 from ..units import Placed
-from .candidates import Mask, Opening, Proposer, own_cover
+from .candidates import Mask, Opening, Proposer, own_cover, single
 from .surroundings import Surroundings
 
 DIRECTIONS = 24  # of bars, in half a turn
@@ -113,15 +113,7 @@ def joined_sharply(layer: Group) -> Group:
 
 def parted(layer: Group) -> list[Group]:
     """A layer of opaque shapes that are joined sharply as layers of one shape each."""
-    return [_alone(layer, index, Part(part.kind, part.paint)) for index, part in enumerate(layer.structure)]
-
-
-def _alone(layer: Group, index: int, part: Part) -> Group:
-    values = {
-        slot: layer.values[slot if slot.part is None else Slot(index, slot.parameter)]
-        for slot in slots((part,))
-    }
-    return Group((part,), layer.order, values)
+    return [single(layer, index, Part(part.kind, part.paint)) for index, part in enumerate(layer.structure)]
 
 
 # --- bars ---------------------------------------------------------------------------------------------------
