@@ -100,7 +100,7 @@ JOINS: dict[str, Join] = {
         Join("intersection", "&", smooth_intersection),
     )
 }
-UNION, SUBTRACTION = "union", "subtraction"
+UNION, SUBTRACTION, INTERSECTION = "union", "subtraction", "intersection"
 
 
 def union_reach(count: int, smoothness: Expr) -> Expr:

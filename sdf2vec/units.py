@@ -18,6 +18,7 @@ from .operation import FLOAT, VECTOR, Type
 LONGEST_CANVAS = 65536.0  # scene units: the longest canvas there can be; anything larger is a mistake
 MARGIN = 0.3  # scene units that a position may leave the canvas by
 LONGEST = 1.5  # longest sides of the canvas
+LEAST_SMOOTHNESS = 1e-3  # scene units: of a join that is smooth at all
 HIGHEST_FREQUENCY = 60.0  # radians per scene unit
 STEEPEST = 4.0  # of a gradient: ranges of colour across half a shape
 FAINTEST = 0.02  # opacity where colours are not signed: below it a shape would stop learning
@@ -194,6 +195,11 @@ def _keep_angle(values: Any, positive: bool, room: Room) -> None:
     values.remainder_(math.tau)
 
 
+def _keep_smoothness(values: Any, positive: bool, room: Room) -> None:
+    """What is sharp stays so; what is not does not become so by chance, for no derivative would lead back."""
+    values.copy_(values.where(values == 0.0, values.clamp(LEAST_SMOOTHNESS, LONGEST)))
+
+
 def _keep_within(low: float, high: float) -> Callable[[Any, bool, Room], None]:
     return lambda values, positive, room: values.clamp_(low, high)
 
@@ -341,7 +347,7 @@ SMOOTHNESS = Unit(
     0.0,
     LONGEST_CANVAS,
     0.003,
-    _keep_within(1e-3, LONGEST),
+    _keep_smoothness,
     Codec(_grown_between("smoothness"), "falloff", _root, _grown, grown),
     scaling=1,
     crowded=True,

@@ -145,6 +145,14 @@ def reductions(layer: Group) -> Iterator[Group]:
             yield Group((first, *fewer.structure[1:]), fewer.order, values)
 
 
+def joined_sharply(layer: Group) -> Group:
+    """A layer whose shapes are joined without smoothness."""
+    sharp = {
+        slot: torch.zeros_like(tensor) for slot, tensor in layer.values.items() if slot.parameter is JOIN
+    }
+    return replace(layer, values={**layer.values, **sharp})
+
+
 def without(layer: Group, index: int) -> Group:
     """A layer without one of its parts; the next one is not made the first."""
     parts = layer.structure
@@ -370,7 +378,7 @@ def _misses(structure: Structure, masks: Sequence[Mask], around: Surroundings, b
     amounts = torch.stack([mask.amount for mask in masks])[:, None]
     x, y, pixel = around.points
     points, compositing = (x, y, pixel * blur), around.scene.compositing
-    if any(part.adds for part in structure[1:]):
+    if len(structure) > 2 or any(part.adds for part in structure[1:]):
 
         def wrong(rows: torch.Tensor) -> torch.Tensor:
             cover, _ = rows_coverage(structure, rows, compositing, *points)

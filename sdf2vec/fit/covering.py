@@ -7,7 +7,7 @@ it, and the one that covers most joins the layer.
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
@@ -16,11 +16,11 @@ from scipy import ndimage
 
 from ..arrays import BoolArray, Float64Array
 from ..blend import UNION
-from ..layer import JOIN, Part
+from ..layer import Part
 from ..render.tensors import Group
 from ..shapes import KINDS
 from ..units import Placed
-from .candidates import Mask, Opening, Proposer, own_cover, single
+from .candidates import Mask, Opening, Proposer, joined_sharply, own_cover, single
 from .surroundings import Surroundings
 
 DIRECTIONS = 24  # of bars, in half a turn
@@ -101,14 +101,6 @@ class Covering:
         stretches = torch.stack([length / own[0], width / own[1]]) / size
         middle = torch.from_numpy(bar.middle) * pixel + torch.stack([x[0], y[0]])
         return Placed(middle[None].float(), size[None], torch.tensor([bar.turn]), stretches[None])
-
-
-def joined_sharply(layer: Group) -> Group:
-    """A layer whose shapes are joined without smoothness."""
-    sharp = {
-        slot: torch.zeros_like(tensor) for slot, tensor in layer.values.items() if slot.parameter is JOIN
-    }
-    return replace(layer, values={**layer.values, **sharp})
 
 
 def parted(layer: Group) -> list[Group]:

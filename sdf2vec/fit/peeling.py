@@ -8,7 +8,7 @@ taken off the picture. What an opaque one hides is not known then: what lies und
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 
@@ -18,12 +18,14 @@ from scipy import ndimage
 from skimage.morphology import convex_hull_image
 
 from ..arrays import BoolArray
-from ..blend import SUBTRACTION
+from ..blend import INTERSECTION, SUBTRACTION
 from ..layer import LOOK, Slot, Structure, row_width
+from ..paints import FLAT
 from ..render.reference import rows_coverage
 from ..render.tensors import Group, SceneTensors
-from .candidates import Mask, Opening, Proposer, own_cover, reductions
-from .covering import Covering, joined_sharply, parted
+from .arcs import Arc, arcs
+from .candidates import Mask, Opening, Proposer, joined_sharply, own_cover, reductions
+from .covering import Covering, parted
 from .initialization import straight
 from .joining import Search, inserted
 from .region_graph import Regions
@@ -43,10 +45,12 @@ LEAST_OFF, FINELY_OFF = 0.15, 0.08  # below that an outline is no better; in the
 TOGETHER = 0.27  # the same of several shapes: what round ones that have the very outline come to
 GOOD = 0.25  # share of a layer that its shape may miss, at most
 GROSSLY = 0.01  # share of it that may be wrong where the largest surroundings show it, by more than an edge
+CIRCLE, ON_CIRCLES = "circle", 2  # the kind, and those of an outline from which others are cut, or which are
 HIDDEN = 0.5  # share of another region, at most, that a layer on top covers
 BITTEN = 0.05  # share of what is cut out of a shape that is beyond its edge: a bite, no hole
 PRICE, DEAR = 0.04, 0.15  # of a number, in logarithms of what is missed; of shapes that are all good
 EAGER = 0.25  # how much it matters what is covered too much, where it may be cut away
+LIKELY_ROUND = 6
 LIKELY, STEPS = 3, 10  # structures whose outlines are sharpened in the end; steps of each
 HOPEFUL = 3.0  # pixels by which these are off
 TINY = 1e-9
@@ -182,11 +186,16 @@ class Area:
         return float(squares.sum()) / max(float(self.inside.sum()), TINY)
 
     def _is_bitten(self, layer: Group) -> bool:
-        """Whether a shape that is cut out of another goes beyond its edge."""
-        if len(layer.structure) < 2 or layer.structure[1].adds:
-            return False
-        base, cut = (own_cover(layer, index, self.around) for index in (0, 1))
-        return bool((cut * (1.0 - base)).sum() > BITTEN * cut.sum())
+        """Whether a shape that is cut out of the first goes beyond its edge, or one that leaves a part of it does."""
+        joins = [part.join for part in layer.structure]
+        if INTERSECTION in joins:
+            return True
+        base, *cuts = (own_cover(layer, index, self.around) for index in range(len(joins)))
+        return any(
+            (cut * (1.0 - base)).sum() > BITTEN * cut.sum()
+            for cut, join in zip(cuts, joins[1:], strict=True)
+            if join == SUBTRACTION
+        )
 
     def cover(self, layer: Group) -> torch.Tensor:
         """Coverage [P] of a layer without its opacity."""
@@ -220,7 +229,19 @@ class Area:
         """A place for a shape that is cut out of one which covers too much."""
         matters = self.known * self.cover(base)
         too_much = (matters - self.inside).clamp_min(0.0)
-        return Opening(base, 1, SUBTRACTION, self.color, Mask(matters, too_much, 0.0))
+        return Opening(base, len(base.structure), SUBTRACTION, self.color, Mask(matters, too_much, 0.0))
+
+    def on(self, arc: Arc, place: Opening) -> Group:
+        """The layer with a circle that an outline runs along in a place."""
+        x, y, pixel = self.around.points
+        middle = torch.stack([x[0] + arc.x * pixel, y[0] + arc.y * pixel])
+        circle = {"center": middle[None], "radius": torch.full((1, 1), arc.radius) * pixel}
+        return place.filled(place.part(CIRCLE, FLAT), circle)
+
+    def meeting(self, base: Group) -> Opening:
+        """A place for a shape of which only what it has in common with one that covers too much is left."""
+        matters = self.known * self.cover(base)
+        return Opening(base, len(base.structure), INTERSECTION, self.color, Mask(matters, self.inside, 0.0))
 
 
 @dataclass(frozen=True)
@@ -379,9 +400,7 @@ def _outlined(area: Area, fine: Area, search: Search) -> Outlined | None:
     ranked = _sharpest(plain, area, proposer)
     good = _distinct([each for each in ranked if each.is_good])[:LIKELY]
     if good:
-        mask = fine.opening().mask
-        exact = [proposer.sharpened(each.layer, mask, fine.around, STEPS) for each in good]
-        return area.outlined(min(exact, key=lambda layer: fine.outlined(layer).priced(FINELY_OFF, DEAR)))
+        return _finest(good, area, fine, proposer, lambda each: each.priced(FINELY_OFF, DEAR))
     best = ranked[0]
     wide = sorted(_single(area, area.opening(EAGER), proposer), key=lambda each: _eager(each, area))
     cut = [
@@ -390,7 +409,46 @@ def _outlined(area: Area, fine: Area, search: Search) -> Outlined | None:
         for tried in proposer.candidates([area.cut(base.layer)], area.around)[0]
     ]
     best = _sharpest([best, *cut], area, proposer)[0]
-    return best if best.is_good or area.overlay.opacity < 1.0 else _together(area, proposer) or best
+    if area.overlay.opacity < 1.0:
+        return best
+    round_ones = _on_circles(area, proposer)
+    if round_ones and min(each.score for each in round_ones) < best.score:
+        return _finest(round_ones, area, fine, proposer, lambda each: each.score)
+    return best if best.is_good else _together(area, proposer) or best
+
+
+def _finest(
+    good: Sequence[Outlined],
+    area: Area,
+    fine: Area,
+    proposer: Proposer,
+    rank: Callable[[Outlined], float],
+) -> Outlined:
+    """The best of good ones after some steps of their outlines in the finest surroundings, by what is seen there."""
+    mask = fine.opening().mask
+    exact = [proposer.sharpened(each.layer, mask, fine.around, STEPS) for each in good]
+    return area.outlined(min(exact, key=lambda layer: rank(fine.outlined(layer))))
+
+
+def _on_circles(area: Area, proposer: Proposer) -> list[Outlined]:
+    """What is left of circles that the outline runs along, where others are cut out of them and a shape leaves or takes
+    away a part: sectors, bows. None but those that have the very outline.
+    """
+    if CIRCLE not in proposer.kinds:
+        return []
+    shape = area.around.shape
+    found = arcs(*(mask.reshape(shape).numpy() for mask in (area.inside, area.known)))
+    outer, inner = ([arc for arc in found if arc.is_outer == side][:ON_CIRCLES] for side in (True, False))
+    tried: list[Outlined] = []
+    for arc in outer:
+        disc = area.on(arc, area.opening())
+        for base in (disc, *(area.on(hole, area.cut(disc)) for hole in inner)):
+            places = [area.meeting(base), area.cut(base)]
+            made = [each.layer for own in proposer.candidates(places, area.around) for each in own]
+            tried += map(area.outlined, [base, *made] if base is not disc else made)
+    return _distinct(
+        [each for each in _sharpest(tried, area, proposer, LIKELY_ROUND) if each.off < TOGETHER]
+    )[:LIKELY_ROUND]
 
 
 def _together(area: Area, proposer: Proposer) -> Outlined | None:
@@ -420,9 +478,11 @@ def _distinct(ranked: Sequence[Outlined]) -> list[Outlined]:
     return list(found.values())
 
 
-def _sharpest(tried: Sequence[Outlined], area: Area, proposer: Proposer) -> list[Outlined]:
+def _sharpest(
+    tried: Sequence[Outlined], area: Area, proposer: Proposer, most: int = LIKELY
+) -> list[Outlined]:
     """The best first, the likeliest structures after some steps of their outlines."""
-    likely = _distinct(sorted(tried, key=lambda each: each.score))[:LIKELY]
+    likely = _distinct(sorted(tried, key=lambda each: each.score))[:most]
     mask = area.opening().mask
     sharp = [
         area.outlined(proposer.sharpened(each.layer, mask, area.around, STEPS))

@@ -14,13 +14,13 @@ import torch
 
 from ..expr import const
 from ..graph import scalarize
-from ..layer import LOOK, Part, Slot, slots
+from ..layer import JOIN, LOOK, Part, Slot, slots
 from ..lower.torch import Tensors, compile_torch
 from ..paints import BASE, FLAT
 from ..render.tensors import Group, SceneTensors
 from ..shapes import KINDS
 from ..units import ANGLE, COLOR
-from .candidates import reductions
+from .candidates import joined_sharply, reductions
 from .joining import Search, inserted
 from .surroundings import Surroundings, View, error_of, layer_at
 
@@ -207,6 +207,13 @@ def _sharp(layer: Group, view: View) -> Iterator[Change]:
         yield _with(layer, slot, 0.0), (slot,)
 
 
+def _joined_sharply(layer: Group, view: View) -> Iterator[Change]:
+    """The layer with all its shapes joined without smoothness."""
+    joins = tuple(slot for slot in layer.values if slot.parameter is JOIN)
+    if joins:
+        yield joined_sharply(layer), joins
+
+
 def _unrounded(layer: Group, view: View) -> Iterator[Change]:
     for slot in layer.values:
         if slot.part is not None and slot.parameter.name == "corner_radius":
@@ -226,6 +233,7 @@ CHANGES: tuple[Propose, ...] = (
     _fewer_parts,
     _circle,
     _flat,
+    _joined_sharply,
     _unrounded,
     _upright,
     _opaque,

@@ -214,6 +214,44 @@ def test_a_hole_of_another_shape_is_seen_where_the_picture_is_large():
     assert peeled(bare, sizes, search_of()).layer_count == 0
 
 
+def sector(first, last, radius, hole=0):
+    """Part of a disc or of a ring in the middle, between two directions in degrees."""
+    x, y = points()
+    turn = np.degrees(np.arctan2(y - 48, x - 48)) % 360
+    return disc(48, 48, radius) & ~disc(48, 48, hole) & (turn >= first) & (turn < last)
+
+
+@pytest.mark.parametrize(
+    ("mask", "kinds"),
+    [
+        (sector(200, 290, 42), ["circle", "triangle"]),
+        (sector(180, 360, 42), ["circle", "box"]),
+        (sector(120, 210, 42, 22), ["circle", "circle", None]),
+        (sector(40, 320, 42, 26), ["circle", "circle", None]),
+    ],
+    ids=["slice", "half", "part of a ring", "ring with a gap"],
+)
+def test_what_is_left_of_a_circle_is_one_layer(mask, kinds):
+    """Which shape leaves a part of a narrow ring is not seen."""
+    pixels = painted((mask, BLUE, 1.0))
+    (layer,) = apart(pixels, 48)
+    found = [shape.kind for shape in layer.shapes]
+    assert len(found) == len(kinds)
+    assert all(want in (None, have) for want, have in zip(kinds, found, strict=True))
+    scene = Scene(SIDE, SIDE, (layer,), (1.0, 1.0, 1.0))
+    assert -10 * np.log10(np.mean((render(scene) - pixels) ** 2)) > 30
+
+
+def test_a_pie_is_a_layer_for_each_of_its_slices():
+    slices = [
+        (sector(*ends, 40), color, 1.0)
+        for ends, color in (((0, 130), RED), ((130, 230), GREEN), ((230, 360), BLUE))
+    ]
+    layers = apart(painted(*slices), 48)
+    assert len(layers) == 3
+    assert all(layer.shapes[0].kind == "circle" for layer in layers)
+
+
 def dots(across, down, radius):
     """Middles and a mask of so many dots all over the picture."""
     middles = [

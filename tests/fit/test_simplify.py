@@ -16,7 +16,7 @@ from sdf2vec.image import Picture
 from sdf2vec.quality import quality
 from sdf2vec.render.draw import draw
 from sdf2vec.render.tensors import from_scene, to_scene
-from sdf2vec.scene import Layer, Shape
+from sdf2vec.scene import Joint, Layer, Shape
 
 RED, ALMOST = (0.8, 0.1, 0.2), (0.802, 0.1, 0.199)
 
@@ -43,6 +43,27 @@ def box(end=None):
     return Shape.of(
         "box", RED, **paint, center=(0.0, 0.0), half_size=(0.3, 0.2), angle=0.0, corner_radius=0.0
     )
+
+
+def pierced(smoothness, hole=0.1):
+    """A disc with a hole."""
+    shapes = disc(RED, 0.0), Shape.of("circle", RED, center=(0.02, 0.0), radius=hole)
+    return Scene(48, 48, (Layer(shapes, joints=(Joint("subtraction", smoothness),)),), (1.0, 1.0, 1.0))
+
+
+def test_joins_become_sharp_where_they_are():
+    """A smooth join makes a hole larger: a smaller one had come to the same."""
+    drawn = pierced(0.0)
+    (layer,) = as_simple_as_drawn(pierced(0.03, 0.09), drawn, 1e-4).layers
+    assert [joint.smoothness for joint in layer.joints] == [0.0]
+    assert abs(layer.shapes[1].parameters[2] - 0.1) < 0.003
+
+
+def test_joins_that_are_seen_to_be_smooth_stay_so():
+    shapes = (disc(RED, -0.15), disc(RED, 0.15))
+    joined = Scene(48, 48, (Layer(shapes, joints=(Joint("union", 0.06),)),), (1.0, 1.0, 1.0))
+    (layer,) = as_simple_as_drawn(joined, joined).layers
+    assert layer.joints[0].smoothness > 0.04
 
 
 def test_colours_that_are_close_become_one():

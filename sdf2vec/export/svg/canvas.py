@@ -65,3 +65,10 @@ class Canvas:
 def pairs(points: Points) -> tuple[Point, ...]:
     """Points [N, 2] as tuples."""
     return tuple((x, y) for x, y in points.tolist())
+
+
+def growing(radius: float, digits: int) -> float:
+    """A radius of half a circle that renderers make larger until it reaches from end to end, for one that is too large,
+    as these are rounded towards each other, flattens it.
+    """
+    return max(radius - 10.0**-digits, 0.5 * radius)

@@ -109,7 +109,7 @@ def _moved(scene: Scene, samples: LayerSamples, geometries: Sequence[Geometry], 
 
 def _squared_move(geometry: Geometry, canvas: Canvas) -> float:
     """By how much an edge is moved when it is written, in user units: the mean square."""
-    if isinstance(geometry, Path):
+    if isinstance(geometry, Path) and any(contour.is_curved for contour in geometry.contours):
         return (STRAYED * _tolerance(canvas)) ** 2 + ROUNDED
     if isinstance(geometry, PolygonOutline):
         numbers = np.array(geometry.points)

@@ -13,7 +13,22 @@ from typing import NamedTuple
 from ...outlines import Outline, Point
 from ...scene import Color, Ground
 
-Segment = tuple[Point, ...]  # a Bézier curve without its start: one point is a line, three are a cubic
+
+class Arc(NamedTuple):
+    """A part of an ellipse whose own axes are turned by `angle`, to a point: the larger part, or clockwise on the
+    screen.
+    """
+
+    radii: Point
+    angle: float
+    is_large: bool
+    is_clockwise: bool
+    end: Point
+
+
+Segment = (
+    tuple[Point, ...] | Arc
+)  # without its start; of points a Bézier curve: one is a line, three are a cubic
 
 
 class Contour(NamedTuple):
@@ -33,6 +48,16 @@ class Contour(NamedTuple):
         """Whether its first segment is a line."""
         return bool(self.segments) and len(self.segments[0]) == 1
 
+    @property
+    def is_curved(self) -> bool:
+        """Whether it has Bézier curves."""
+        return any(len(segment) > 1 for segment in self.segments if not isinstance(segment, Arc))
+
+    @property
+    def points(self) -> list[Point]:
+        """Those that its segments tell, but the start."""
+        return [p for each in self.segments for p in ((each.end,) if isinstance(each, Arc) else each)]
+
 
 @dataclass(frozen=True)
 class Path:
@@ -41,14 +66,7 @@ class Path:
     contours: tuple[Contour, ...]
 
 
-@dataclass(frozen=True)
-class Outlines:
-    """What lies within an odd number of outlines, which nowhere cross."""
-
-    each: tuple[Outline, ...]
-
-
-Geometry = Outline | Path | Outlines
+Geometry = Outline | Path
 
 
 class Stop(NamedTuple):

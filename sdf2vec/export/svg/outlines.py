@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, replace
 from functools import singledispatch
-from typing import cast
 
 import numpy as np
 
@@ -15,7 +14,7 @@ from ...scene import Layer
 from ...shapes import KINDS
 from .bezier_fit import smooth_path
 from .canvas import Canvas, Points, pairs
-from .display import Geometry, Outlines
+from .display import Geometry
 from .sampling import SampleGrid
 
 FLAT = 1e-9  # scene units: a side shorter than this is none
@@ -40,7 +39,7 @@ def edge_of(layer: Layer, falloffs: float) -> Outline | None:
 
 
 @singledispatch
-def placed(outline: Outline | Outlines | Traced, canvas: Canvas) -> Geometry:
+def placed(outline: Outline | Traced, canvas: Canvas) -> Geometry:
     """The outline in user units."""
     raise NotImplementedError(type(outline))
 
@@ -65,11 +64,6 @@ def _(outline: RectangleOutline, canvas: Canvas) -> Geometry:
 @placed.register
 def _(outline: PolygonOutline, canvas: Canvas) -> Geometry:
     return PolygonOutline(pairs(canvas.places(outline.points)), outline.rounding * canvas.unit)
-
-
-@placed.register
-def _(outline: Outlines, canvas: Canvas) -> Geometry:
-    return Outlines(tuple(cast("Outline", placed(each, canvas)) for each in outline.each))
 
 
 @placed.register
@@ -163,14 +157,19 @@ def _(outline: PolygonOutline, share: float) -> Outline:
 
 def distance_to(outline: Outline | Traced, grid: SampleGrid) -> Float64Array:
     """Signed distances [Y, X] to an outline made of a convex polygon."""
-    made = None if isinstance(outline, Traced) else core(outline)
+    assert not isinstance(outline, Traced)
+    return distance_at(outline, grid.x[None, :], grid.y[:, None])
+
+
+def distance_at(outline: Outline, x: Float64Array, y: Float64Array) -> Float64Array:
+    """The same at places x and y, which are broadcast against each other."""
+    made = core(outline)
     assert made is not None
     points, rounding = made
-    x, y = grid.x[None, :], grid.y[:, None]
     corners = convex(points)
     if len(corners) == 1:
         return np.asarray(np.hypot(x - corners[0, 0], y - corners[0, 1])) - rounding
-    squared = np.full((len(grid.y), len(grid.x)), np.inf)
+    squared = np.full(np.broadcast_shapes(x.shape, y.shape), np.inf)
     inside = np.full(squared.shape, len(corners) > 2)
     for a, b, normal in sides(corners):
         px, py = x - a[0], y - a[1]

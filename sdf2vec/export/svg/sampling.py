@@ -151,6 +151,13 @@ def distances(layer: Layer, grid: SampleGrid) -> Float64Array:
     return np.asarray(_evaluate(layer, grid, 0.0, 1)[0])
 
 
+def distance_of(layer: Layer, places: Float64Array) -> Float64Array:
+    """Signed distances [N] from a layer of points [N, 2]."""
+    count = 5 if len(layer.shapes) > MANY else 1
+    found = _formula(layer.structure, count)(*places.T, 0.0, *layer.numbers)[0]
+    return np.asarray(np.broadcast_to(found, len(places)), np.float64)
+
+
 def covers(layer: Layer, grid: SampleGrid, pixel: float) -> Float64Array:
     """Coverage [Y, X] of a layer for pixels of a size in scene units."""
     return np.asarray(_evaluate(layer, grid, pixel, 2)[1])

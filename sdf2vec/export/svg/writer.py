@@ -16,11 +16,12 @@ from xml.sax.saxutils import escape
 import numpy as np
 import svgwrite
 
-from ...outlines import EllipseOutline, Outline, Point, PolygonOutline, RectangleOutline
+from ...outlines import EllipseOutline, Point, PolygonOutline, RectangleOutline
 from ...scene import Color
 from ..exported import MARK
-from .canvas import Points, pairs
+from .canvas import Points, growing, pairs
 from .display import (
+    Arc,
     Contour,
     Drawing,
     Figure,
@@ -28,13 +29,12 @@ from .display import (
     Group,
     Item,
     LinearGradient,
-    Outlines,
     Path,
     RadialGradient,
     Stop,
 )
 from .filter_regions import Region, region_of, region_of_group, rounding_of, shared_regions
-from .outlines import convex, core, sides
+from .outlines import convex, sides
 from .wording import compressible
 
 Element = Any  # svgwrite has no types
@@ -271,11 +271,6 @@ class _Writer:
         return self._with(self.svg.path(data), look)
 
     @element.register
-    def _(self, geometry: Outlines, look: Attributes) -> Element:
-        data = "".join(map(self._closed, geometry.each))
-        return self._with(self.svg.path(data), look | {"fill-rule": "evenodd"})
-
-    @element.register
     def _(self, geometry: Path, look: Attributes) -> Element:
         alone = len(geometry.contours) == 1
         data = "".join(self._relative(contour, alone) for contour in geometry.contours)
@@ -302,36 +297,17 @@ class _Writer:
             for first in range(len(corners))
         ]
 
-    def _closed(self, outline: Outline) -> str:
-        """Path data of an outline."""
-        made = core(outline)
-        if made is not None:
-            points, rounding = made
-            return f"M{self._joined(points)}Z" if rounding < FLAT else self._rounded(points, rounding)
-        assert isinstance(outline, EllipseOutline)
-        (across, down), angle = outline.radii, outline.angle
-        if across < down:
-            across, down, angle = down, across, angle + math.pi / 2
-        along = np.array([math.cos(angle), math.sin(angle)]) * across
-        one, other = (self._joined(np.array([outline.center]) + sign * along) for sign in (-1.0, 1.0))
-        radii = " ".join(self.number(self._growing(radius)) for radius in (across, down))
-        arc = f"A{radii} {self.fine(math.degrees(angle) % 180.0)} 0 1 "
-        return f"M{one}{arc}{other}{arc}{one}Z"
-
-    def _rounded(self, points: Points, rounding: float) -> str:
-        """Straight edges moved outwards, joined by arcs."""
+    def _closed(self, outline: PolygonOutline) -> str:
+        """Path data of a polygon: straight edges moved outwards, joined by arcs."""
+        points, rounding = np.array(outline.points), outline.rounding
+        if rounding < FLAT:
+            return f"M{self._joined(points)}Z"
         corners = convex(points)
         moved = [(a + n * rounding, b + n * rounding) for a, b, n in sides(corners)] or [(points[0],) * 2]
-        radius = self.number(rounding if len(corners) > 2 else self._growing(rounding))
+        radius = self.number(rounding if len(corners) > 2 else growing(rounding, self.drawing.digits))
         arc = f"A{radius} {radius} 0 0 1 "
         edges = [f"{self._joined(a[None])}L{self._joined(b[None])}" for a, b in moved]
         return f"M{arc.join(edges)}{arc}{self._joined(moved[0][0][None])}Z"
-
-    def _growing(self, radius: float) -> float:
-        """A radius of half a circle that renderers make larger until it reaches from end to end, for one that is too
-        large, as these are rounded towards each other, flattens it.
-        """
-        return max(radius - 10.0**-self.drawing.digits, 0.5 * radius)
 
     def _joined(self, points: Points) -> str:
         return " ".join(f"{self.number(x)} {self.number(y)}" for x, y in points.tolist())
@@ -345,14 +321,23 @@ class _Writer:
         begins, last = ("m", "l") if alone and contour.begins_straight else ("M", "")
         parts = [f"{begins}{self.fine(x)} {self.fine(y)}"]
         for segment in contour.segments:
+            points = (segment.end,) if isinstance(segment, Arc) else segment
             steps = [
-                (round(a - x, self.drawing.digits), round(b - y, self.drawing.digits)) for a, b in segment
+                (round(a - x, self.drawing.digits), round(b - y, self.drawing.digits)) for a, b in points
             ]
-            letter = "l" if len(segment) == 1 else "c"
+            letter = "l" if len(points) == 1 else "c"
             values = " ".join(self.number(value) for step in steps for value in step)
+            if isinstance(segment, Arc):
+                letter, values = "a", f"{self._bow(segment)} {values}"
             parts.append((letter if letter != last else " ") + values)
             x, y, last = x + steps[-1][0], y + steps[-1][1], letter
         return "".join(parts).replace(" -", "-") + "z"
+
+    def _bow(self, arc: Arc) -> str:
+        """What path data says of an arc but its end: radii, turn, the larger part, clockwise."""
+        across, down = map(self.number, arc.radii)
+        turn = "0" if across == down else self.fine(math.degrees(arc.angle) % 180.0)
+        return f"{across} {down} {turn} {arc.is_large:d} {arc.is_clockwise:d}"
 
     # --- numbers --------------------------------------------------------------------------------------------
 

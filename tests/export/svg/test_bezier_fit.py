@@ -30,7 +30,7 @@ def test_a_square_is_four_lines_aside_of_the_pixels():
     points = np.concatenate([np.stack(way, axis=1) for way in ways])
     square = 10.0 + 40.0 * np.concatenate([points, points[:1]])
     (contour,) = straight_path([square], 0.05, CANVAS).contours
-    corners = np.array([contour.start, *(point for (point,) in contour.segments)])
+    corners = np.array([contour.start, *contour.points])
     assert np.allclose(corners, np.array([[10, 10], [50, 10], [50, 50], [10, 50]]) + ASIDE)
 
 

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from sdf2vec import Joint, Layer, Scene, Shape
-from sdf2vec.export.svg.display import Figure, Group, LinearGradient, Outlines, Path, RadialGradient
+from sdf2vec.export.svg.display import Arc, Figure, Group, LinearGradient, Path, RadialGradient
 from sdf2vec.export.svg.layers import drawing
 from sdf2vec.export.svg.plan import DETAILS, Planner
 from sdf2vec.outlines import EllipseOutline, PolygonOutline
@@ -69,16 +69,30 @@ def cut(x, radius, smoothness=0.0, join="subtraction"):
 @pytest.mark.parametrize("layer", [cut(0.05, 0.1), cut(0.05, 0.1, 0.003), cut(0.6, 0.1, join="union")])
 def test_edges_that_do_not_cross_are_those_of_the_shapes(layer):
     (figure,) = items(layer)
-    assert isinstance(figure.geometry, Outlines)
-    radii = [outline.radii for outline in figure.geometry.each if isinstance(outline, EllipseOutline)]
-    assert np.allclose(radii, [(50, 50), (20, 20)])
+    assert isinstance(figure.geometry, Path)
+    arcs = [segment for contour in figure.geometry.contours for segment in contour.segments]
+    radii = [arc.radii for arc in arcs if isinstance(arc, Arc)]
+    assert np.allclose(radii, [(50, 50)] * 2 + [(20, 20)] * 2, atol=0.02)  # halves that renderers make larger
 
 
 @pytest.mark.parametrize(
-    "layer",
-    [cut(0.2, 0.1), cut(0.15, 0.1), cut(0.6, 0.1), cut(0.05, 0.1, 0.05), cut(0.05, 0.1, join="union")],
-    ids=["crossing", "touching", "a cutter outside", "a smooth cut", "one within the other"],
+    ("layer", "contours"),
+    [
+        (cut(0.2, 0.1), 1),
+        (cut(0.6, 0.1), 1),
+        (cut(0.05, 0.1, join="union"), 1),
+        (cut(0.6, 0.1, join="union"), 2),
+    ],
+    ids=["crossing", "a cutter outside", "one within the other", "apart"],
 )
-def test_edges_that_are_not_those_of_the_shapes_are_traced(layer):
+def test_edges_are_made_of_those_of_the_shapes(layer, contours):
     (figure,) = items(layer)
     assert isinstance(figure.geometry, Path)
+    assert len(figure.geometry.contours) == contours
+    assert all(isinstance(each, Arc) for contour in figure.geometry.contours for each in contour.segments)
+
+
+def test_the_edge_of_a_smooth_cut_is_traced():
+    (figure,) = items(cut(0.05, 0.1, 0.05))
+    assert isinstance(figure.geometry, Path)
+    assert all(contour.is_curved for contour in figure.geometry.contours)

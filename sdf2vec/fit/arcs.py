@@ -1,0 +1,134 @@
+"""Circles that the outline of a region runs along: those that it lies in, and those that are cut out of it."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import NamedTuple
+
+import numpy as np
+from scipy import ndimage
+from skimage import measure
+
+from ..arrays import BoolArray, Float64Array
+
+SMOOTHED = 0.7  # pixels: standard deviation of what takes the steps of pixels off an outline
+SHORTEST = 9  # points of an outline, about a pixel apart, that an arc has at least
+SHORTER = 0.8  # from one length that is looked for to the next
+ROUND = 0.2  # pixels by which the points of an arc are off its circle, in the mean of squares, at most
+LEAST_TURN = 0.7  # radians of an arc
+LEAST_RISE = 1.5  # pixels between an arc and its chord, at least
+SAME = 1.5  # pixels by which the centres and radii of two arcs of one circle differ, at most
+MOST = 8  # arcs of an outline
+
+
+class Arc(NamedTuple):
+    """A circle in pixels (x, y; the middle of the first pixel is 0, 0); whether the region lies in it; how many points
+    of the outline run along it.
+    """
+
+    x: float
+    y: float
+    radius: float
+    is_outer: bool
+    points: int
+
+
+def arcs(inside: Float64Array, known: Float64Array) -> list[Arc]:
+    """Those of a region's coverage [H, W] where the outline is known (0..1, [H, W]), the longest first."""
+    found = [each for line in _lines(inside, known) for each in _along(line)]
+    circles: list[list[tuple[Sums, Arc]]] = []
+    for sums, arc in sorted(found, key=lambda each: -each[1].points):
+        same = next((own for own in circles if _are_one(own[0][1], arc)), None)
+        if same is None:
+            circles.append([(sums, arc)])
+        else:
+            same.append((sums, arc))
+    joined = [_joined(own) for own in circles]
+    return sorted(joined, key=lambda arc: -arc.points)[:MOST]
+
+
+def _lines(inside: Float64Array, known: Float64Array) -> Iterator[Float64Array]:
+    """The parts of the outline that are known, as points (x, y) [N, 2]."""
+    known_here = np.pad(known, 1) > 0.5
+    smooth = ndimage.gaussian_filter(np.pad(inside, 1).astype(np.float64), SMOOTHED)
+    for outline in measure.find_contours(smooth, 0.5):
+        low, high = (rounded(outline).astype(int).T for rounded in (np.floor, np.ceil))
+        is_known = known_here[low[0], low[1]] & known_here[high[0], high[1]]
+        points = outline[:, ::-1] - 1.0
+        if is_known.all():  # closed: an arc may go on behind its first point
+            yield np.concatenate([points, points[1:]])
+            continue
+        breaks = np.flatnonzero(np.diff(is_known.astype(int))) + 1
+        for part, own in zip(np.split(points, breaks), np.split(is_known, breaks), strict=True):
+            if own[0] and len(part) >= SHORTEST:
+                yield part
+
+
+Sums = Float64Array  # of products of (x, y, 1, x² + y²), [4, 4]
+
+
+def _along(line: Float64Array) -> Iterator[tuple[Sums, Arc]]:
+    """Arcs of a line, the longest first, that share no points."""
+    powers = np.concatenate([line, np.ones((len(line), 1)), (line**2).sum(1, keepdims=True)], axis=1)
+    sums = np.zeros((len(line) + 1, 4, 4))
+    np.cumsum(powers[:, :, None] * powers[:, None], axis=0, out=sums[1:])
+    free: BoolArray = np.ones(len(line), bool)
+    length = len(line)
+    while length >= SHORTEST:
+        starts = np.arange(len(line) - length + 1)
+        taken = np.concatenate([[0], np.cumsum(~free)])
+        starts = starts[taken[starts + length] == taken[starts]]
+        while len(starts):
+            own = sums[starts + length] - sums[starts]
+            circles, off = _circles(own)
+            chords = np.hypot(*(line[starts + length - 1] - line[starts]).T)
+            good = np.flatnonzero((off < ROUND) & _is_bent(circles[:, 2], chords, length))
+            if not len(good):
+                break
+            best = int(good[off[good].argmin()])
+            first = int(starts[best])
+            yield own[best], _arc(circles[best], line[first : first + length])
+            free[first : first + length] = False
+            starts = starts[(starts + length <= first) | (starts >= first + length)]
+        length = min(int(length * SHORTER), length - 1)
+
+
+def _is_bent(radii: Float64Array, chords: Float64Array, length: int) -> BoolArray:
+    """Whether arcs turn enough; by their chords, and by about how long they are."""
+    turns = length / radii
+    half = np.minimum(chords / (2.0 * radii), 1.0)
+    rise = np.where(turns > np.pi, radii, radii * (1.0 - np.sqrt(1.0 - half**2)))
+    bent: BoolArray = (turns > LEAST_TURN) & (rise > LEAST_RISE)
+    return bent
+
+
+def _circles(sums: Float64Array) -> tuple[Float64Array, Float64Array]:
+    """Circles (x, y, radius) [N, 3] by least squares of x² + y² (Kåsa 1976), and by how many pixels points are off."""
+    matrix, right = sums[:, :3, :3], sums[:, :3, 3]
+    eye = np.eye(3) * 1e-9 * np.trace(matrix, axis1=1, axis2=2)[:, None, None]
+    solved = np.linalg.solve(matrix + eye, right[..., None])[..., 0]
+    centers = solved[:, :2] / 2.0
+    radii = np.sqrt(np.maximum(solved[:, 2] + (centers**2).sum(1), 1e-9))
+    squares = sums[:, 3, 3] - (solved * right).sum(1)
+    off = np.sqrt(np.maximum(squares, 0.0) / matrix[:, 2, 2]) / (2.0 * radii)
+    return np.concatenate([centers, radii[:, None]], axis=1), off
+
+
+def _arc(circle: Float64Array, points: Float64Array) -> Arc:
+    x, y, radius = circle.tolist()
+    away = points - (x, y)
+    turn = (away[:-1, 0] * away[1:, 1] - away[:-1, 1] * away[1:, 0]).sum()
+    return Arc(x, y, radius, bool(turn > 0), len(points))
+
+
+def _are_one(a: Arc, b: Arc) -> bool:
+    """Whether two arcs are of one circle."""
+    apart = np.hypot(a.x - b.x, a.y - b.y)
+    return a.is_outer == b.is_outer and max(apart, abs(a.radius - b.radius)) < SAME
+
+
+def _joined(own: list[tuple[Sums, Arc]]) -> Arc:
+    """The circle of several arcs."""
+    circles, _ = _circles(np.sum([sums for sums, _ in own], axis=0)[None])
+    x, y, radius = circles[0].tolist()
+    return Arc(x, y, radius, own[0][1].is_outer, sum(arc.points for _, arc in own))
