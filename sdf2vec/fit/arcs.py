@@ -6,13 +6,10 @@ from collections.abc import Iterator
 from typing import NamedTuple
 
 import numpy as np
-from scipy import ndimage
-from skimage import measure
 
 from ..arrays import BoolArray, Float64Array
+from .contours import SHORTEST, Outline, known_outlines
 
-SMOOTHED = 0.7  # pixels: standard deviation of what takes the steps of pixels off an outline
-SHORTEST = 9  # points of an outline, about a pixel apart, that an arc has at least
 SHORTER = 0.8  # from one length that is looked for to the next
 ROUND = 0.2  # pixels by which the points of an arc are off its circle, in the mean of squares, at most
 LEAST_TURN = 0.7  # radians of an arc
@@ -35,7 +32,7 @@ class Arc(NamedTuple):
 
 def arcs(inside: Float64Array, known: Float64Array) -> list[Arc]:
     """Those of a region's coverage [H, W] where the outline is known (0..1, [H, W]), the longest first."""
-    found = [each for line in _lines(inside, known) for each in _along(line)]
+    found = [each for outline in known_outlines(inside, known) for each in _along(_line(outline))]
     circles: list[list[tuple[Sums, Arc]]] = []
     for sums, arc in sorted(found, key=lambda each: -each[1].points):
         same = next((own for own in circles if _are_one(own[0][1], arc)), None)
@@ -47,21 +44,10 @@ def arcs(inside: Float64Array, known: Float64Array) -> list[Arc]:
     return sorted(joined, key=lambda arc: -arc.points)[:MOST]
 
 
-def _lines(inside: Float64Array, known: Float64Array) -> Iterator[Float64Array]:
-    """The parts of the outline that are known, as points (x, y) [N, 2]."""
-    known_here = np.pad(known, 1) > 0.5
-    smooth = ndimage.gaussian_filter(np.pad(inside, 1).astype(np.float64), SMOOTHED)
-    for outline in measure.find_contours(smooth, 0.5):
-        low, high = (rounded(outline).astype(int).T for rounded in (np.floor, np.ceil))
-        is_known = known_here[low[0], low[1]] & known_here[high[0], high[1]]
-        points = outline[:, ::-1] - 1.0
-        if is_known.all():  # closed: an arc may go on behind its first point
-            yield np.concatenate([points, points[1:]])
-            continue
-        breaks = np.flatnonzero(np.diff(is_known.astype(int))) + 1
-        for part, own in zip(np.split(points, breaks), np.split(is_known, breaks), strict=True):
-            if own[0] and len(part) >= SHORTEST:
-                yield part
+def _line(outline: Outline) -> Float64Array:
+    """The points of an outline; of a closed one twice, for an arc may go on behind the first."""
+    points = outline.points
+    return np.concatenate([points, points[1:]]) if outline.is_closed else points
 
 
 Sums = Float64Array  # of products of (x, y, 1, x² + y²), [4, 4]

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
+from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
@@ -17,10 +18,12 @@ from scipy import ndimage
 from ..arrays import BoolArray, Float64Array
 from ..blend import UNION
 from ..layer import Part
+from ..paints import FLAT
 from ..render.tensors import Group
 from ..shapes import KINDS
 from ..units import Placed
 from .candidates import Mask, Opening, Proposer, joined_sharply, own_cover, single
+from .corners import corners, triangles
 from .surroundings import Surroundings
 
 DIRECTIONS = 24  # of bars, in half a turn
@@ -30,7 +33,7 @@ STARTS = 3  # of a kind of shape
 STRICT = 4.0  # how much it matters what is covered too much, against what is not covered
 # share of a region that may be left by all parts, if each covers as much of what is left as the last did
 LEFT = 0.02
-BOX = "box"
+BOX, TRIANGLE = "box", "triangle"
 # how much it counts what a shape covers: a simple kind is the likelier
 SIMPLE, OTHER = {"circle": 1.0, BOX: 0.96}, 0.92
 
@@ -56,6 +59,7 @@ class Covering:
     looks: Group
     around: Surroundings
     proposer: Proposer
+    has_corners: bool = False  # whether triangles between corners of its outline are tried, too
 
     def layers(self) -> Iterator[Group]:
         """Layers of two, three and more shapes joined sharply, which cover ever more; none once that gets hopeless."""
@@ -81,16 +85,42 @@ class Covering:
         index = len(layer.structure)
         mask = Mask(left + STRICT * too_much, left, 0.0)
         place = Opening(layer, index, UNION if index else "", self.color, mask)
-        starts = [self._placed(bar), self.proposer.placed(left, self.around)]
+        tried = self._triangles(place, left, too_much) if self.has_corners else self._along(bar, place, left)
         best, most = layer, 0.0
-        for kind in self.proposer.kinds:
-            for _, made in self.proposer.optima(kind, [place] * 2, starts, self.around, STARTS):
-                cover = own_cover(made, index, self.around)
-                gain = float((cover * (left - STRICT * too_much)).sum())
-                gain *= SIMPLE.get(kind, OTHER)
-                if gain > most:
-                    best, most = made, gain
+        for made in tried:
+            cover = own_cover(made, index, self.around)
+            gain = float((cover * (left - STRICT * too_much)).sum())
+            gain *= 1.0 if self.has_corners else SIMPLE.get(made.structure[index].kind, OTHER)
+            if gain > most:
+                best, most = made, gain
         return joined_sharply(best) if most else None
+
+    def _along(self, bar: Bar, place: Opening, left: torch.Tensor) -> list[Group]:
+        """The layer with shapes of every kind from where a bar is, and from what is left [P]."""
+        starts = [self._placed(bar), self.proposer.placed(left, self.around)]
+        return [
+            made
+            for kind in self.proposer.kinds
+            for _, made in self.proposer.optima(kind, [place] * 2, starts, self.around, STARTS)
+        ]
+
+    @cached_property
+    def _corners(self) -> Float64Array:
+        """Of its outline, [N, 2] in pixels."""
+        return corners(*(mask.reshape(self.around.shape).numpy() for mask in (self.inside, self.known)))
+
+    def _triangles(self, place: Opening, left: torch.Tensor, too_much: torch.Tensor) -> list[Group]:
+        """The layer with triangles between corners of the outline that cover most of what is left [P]."""
+        if not self.has_corners or TRIANGLE not in self.proposer.kinds:
+            return []
+        wanted, unwanted = (mask.reshape(self.around.shape).numpy() for mask in (left, STRICT * too_much))
+        x, y, pixel = self.around.points
+        first, part = torch.stack([x[0], y[0]]), place.part(TRIANGLE, FLAT)
+        found = []
+        for ends in triangles(self._corners, wanted, unwanted, STARTS):
+            at = first + torch.from_numpy(ends).float() * pixel
+            found.append(place.filled(part, dict(zip("abc", at[:, None], strict=True))))
+        return found
 
     def _placed(self, bar: Bar) -> Placed:
         """Where shapes start that are to be where a bar is."""

@@ -252,6 +252,21 @@ def test_a_pie_is_a_layer_for_each_of_its_slices():
     assert all(layer.shapes[0].kind == "circle" for layer in layers)
 
 
+def test_what_has_corners_is_triangles_between_them():
+    """A slanted bar, to which two boxes come near, and a star of five tips, which three triangles are."""
+    x, y = points()
+    slanted = (y > 30) & (y < 62) & (x + 0.6 * y > 50) & (x + 0.6 * y < 76)
+    found = apart(painted((slanted, BLUE, 1.0)), 48)
+    assert [layer.shapes[0].kind for layer in found] == ["triangle"] * 2
+    turns = np.radians(np.arange(5) * 72 - 90)
+    within = [np.cos(turn) * (x - 48) + np.sin(turn) * (y - 48) < 13 for turn in turns + np.pi]
+    star = np.sum(within, axis=0) >= 4  # of the sides of the pentagon within, at most one is between
+    found = apart(painted((star, RED, 1.0)), 48)
+    assert [layer.shapes[0].kind for layer in found] == ["triangle"] * 3
+    scene = Scene(SIDE, SIDE, found, (1.0, 1.0, 1.0))
+    assert -10 * np.log10(np.mean((render(scene) - painted((star, RED, 1.0))) ** 2)) > 28
+
+
 def dots(across, down, radius):
     """Middles and a mask of so many dots all over the picture."""
     middles = [
@@ -274,7 +289,7 @@ def test_ninety_dots_are_ninety_circles():
 def test_where_hardly_any_region_is_a_shape_the_rest_is_left(monkeypatch):
     """Of a photograph in few colours each would be looked at in vain, for minutes."""
     tried = []
-    monkeypatch.setattr(peeling, "_outlined", lambda *arguments: tried.append(arguments))
+    monkeypatch.setattr(peeling, "best_outlined", lambda *arguments: tried.append(arguments))
     assert not apart(painted((dots(10, 9, 3.2)[1], BLUE, 1.0)))
     assert len(tried) == peeling.FAILED + 1
 
