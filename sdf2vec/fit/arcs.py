@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
 from typing import NamedTuple
 
@@ -16,6 +17,8 @@ LEAST_TURN = 0.7  # radians of an arc
 LEAST_RISE = 1.5  # pixels between an arc and its chord, at least
 SAME = 1.5  # pixels by which the centres and radii of two arcs of one circle differ, at most
 MOST = 8  # arcs of an outline
+NARROWEST, WIDEST = 0.1, 2.4  # radians of a wedge
+BEYOND = 1.1  # radii that a wedge reaches in its middle
 
 
 class Arc(NamedTuple):
@@ -28,6 +31,25 @@ class Arc(NamedTuple):
     radius: float
     is_outer: bool
     points: int
+
+    def wedge(self, inside: Float64Array) -> tuple[bool, Float64Array] | None:
+        """A triangle [3, 2] from the middle that goes along both ends of a region of the disc, [H, W], as seen from
+        there: whether the region is within it, or what is not. None where both are about half, or one is nothing.
+        """
+        rows, columns = np.nonzero(inside > 0.5)
+        turns = np.sort(np.arctan2(rows - self.y, columns - self.x))
+        if not len(turns):
+            return None
+        gaps = np.diff(turns, append=turns[0] + math.tau)
+        widest = int(gaps.argmax())
+        gap, end = float(gaps[widest]), float(turns[widest])
+        span, is_within = (math.tau - gap, True) if gap > math.pi else (gap, False)
+        if not NARROWEST < span < WIDEST:
+            return None
+        first = end - span if is_within else end
+        ways = np.array([[math.cos(turn), math.sin(turn)] for turn in (first, first + span)])
+        middle = np.array([self.x, self.y])
+        return is_within, np.stack([middle, *(middle + BEYOND * self.radius / math.cos(span / 2) * ways)])
 
 
 def arcs(inside: Float64Array, known: Float64Array) -> list[Arc]:

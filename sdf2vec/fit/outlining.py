@@ -33,9 +33,11 @@ EXACT = 0.36  # pixels by which an outline is off in the mean, at most
 LEAST_OFF, FINELY_OFF = 0.15, 0.08  # below that an outline is no better; in the finest surroundings
 TOGETHER = 0.27  # the same of several shapes: what round ones that have the very outline come to
 GOOD = 0.25  # share of a layer that its shape may miss, at most
-CIRCLE, ON_CIRCLES = "circle", 2  # the kind, and those of an outline from which others are cut, or which are
+CIRCLE, TRIANGLE = "circle", "triangle"
+ON_CIRCLES = 2  # of an outline from which others are cut, or which are
 BITTEN = 0.05  # share of what is cut out of a shape that is beyond its edge: a bite, no hole
-PRICE, DEAR = 0.04, 0.15  # of a number, in logarithms of what is missed; of shapes that are all good
+# of a number, in logarithms of what is missed; of shapes that are all good; of what is left of circles
+PRICE, DEAR, CHEAP = 0.04, 0.15, 0.01
 EAGER = 0.25  # how much it matters what is covered too much, where it may be cut away
 # structures whose outlines are sharpened in the end; of what is left of circles, which differ less; steps of each
 LIKELY, LIKELY_ROUND, STEPS = 3, 6, 10
@@ -200,6 +202,18 @@ class Area:
         circle = {"center": middle[None], "radius": torch.full((1, 1), arc.radius) * pixel}
         return place.filled(place.part(CIRCLE, FLAT), circle)
 
+    def wedges(self, arc: Arc, base: Group, proposer: Proposer) -> list[Group]:
+        """A layer of which a triangle from the middle of a circle leaves what is seen, or takes away the rest."""
+        found = arc.wedge(self.inside.reshape(self.around.shape).numpy())
+        if found is None or TRIANGLE not in proposer.kinds:
+            return []
+        is_within, ends = found
+        x, y, pixel = self.around.points
+        place = self.meeting(base) if is_within else self.cut(base)
+        corners = torch.stack([x[0], y[0]]) + torch.from_numpy(ends).float() * pixel
+        made = place.filled(place.part(TRIANGLE, FLAT), dict(zip("abc", corners[:, None], strict=True)))
+        return [joined_sharply(made)]
+
     def meeting(self, base: Group) -> Opening:
         """A place for a shape of which only what it has in common with one that covers too much is left."""
         matters = self.known * self.cover(base)
@@ -230,7 +244,7 @@ def best_outlined(area: Area, fine: Area, search: Search) -> Outlined | None:
         return best
     round_ones = _on_circles(area, proposer)
     if round_ones and min(each.score for each in round_ones) < best.score:
-        return _finest(round_ones, area, fine, proposer, lambda each: each.score)
+        return _finest(round_ones, area, fine, proposer, lambda each: each.priced(LEAST_OFF, CHEAP))
     return best if best.off < TOGETHER else _together(area, fine, proposer) or best
 
 
@@ -262,6 +276,7 @@ def _on_circles(area: Area, proposer: Proposer) -> list[Outlined]:
         for base in (disc, *(area.on(hole, area.cut(disc)) for hole in inner)):
             places = [area.meeting(base), area.cut(base)]
             made = [each.layer for own in proposer.candidates(places, area.around) for each in own]
+            made += area.wedges(arc, base, proposer)
             tried += map(area.outlined, [base, *made] if base is not disc else made)
     return _distinct(
         [each for each in _sharpest(tried, area, proposer, LIKELY_ROUND) if each.off < TOGETHER]

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from sdf2vec.fit.arcs import arcs
+from sdf2vec.fit.arcs import Arc, arcs
 
 y, x = np.mgrid[:80, :90].astype(float)
 EVERYWHERE = np.ones(x.shape)
@@ -78,3 +78,35 @@ def test_where_the_outline_is_not_known_it_tells_nothing():
 )
 def test_what_has_no_round_outline_has_no_circle(coverage):
     assert arcs(coverage, EVERYWHERE) == []
+
+
+def test_a_wedge_goes_along_the_ends_of_what_is_seen():
+    """From 20 to 110 degrees within a radius of 30."""
+    ends = np.radians((20, 110))
+    turn = np.arctan2(y - 40, x - 45)
+    seen = (np.hypot(x - 45, y - 40) < 30) & (turn > ends[0]) & (turn < ends[1])
+    found = Arc(45, 40, 30, True, 0).wedge(seen.astype(np.float64))
+    assert found is not None
+    is_within, (middle, one, other) = found
+    assert is_within
+    assert middle.tolist() == [45, 40]
+    assert np.arctan2(*(one - middle)[::-1]) == pytest.approx(ends[0], abs=0.03)
+    assert np.arctan2(*(other - middle)[::-1]) == pytest.approx(ends[1], abs=0.03)
+    assert np.linalg.norm((one + other) / 2 - middle) == pytest.approx(33, abs=0.01)
+
+
+def test_of_most_of_a_disc_the_wedge_is_what_is_not_seen():
+    """The gap lies around the direction to the left, where angles begin anew."""
+    seen = (np.hypot(x - 45, y - 40) < 30) & (np.abs(np.arctan2(y - 40, x - 45)) < np.radians(150))
+    found = Arc(45, 40, 30, True, 0).wedge(seen.astype(np.float64))
+    assert found is not None
+    is_within, (middle, one, other) = found
+    assert not is_within
+    assert np.linalg.norm((one + other) / 2 - middle) == pytest.approx(33, abs=0.01)
+    assert ((one + other) / 2 - middle)[0] == pytest.approx(-33, abs=0.5)
+
+
+@pytest.mark.parametrize("turn", [180, 359, 0])
+def test_of_half_a_disc_of_all_and_of_nothing_there_is_no_wedge(turn):
+    seen = (np.hypot(x - 45, y - 40) < 30) & (np.degrees(np.arctan2(y - 40, x - 45)) % 360 < turn)
+    assert Arc(45, 40, 30, True, 0).wedge(seen.astype(np.float64)) is None
