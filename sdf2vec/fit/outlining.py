@@ -6,7 +6,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -267,6 +267,8 @@ def _on_circles(area: Area, proposer: Proposer) -> list[Outlined]:
     """
     if CIRCLE not in proposer.kinds:
         return []
+    # chances of its own: what is tried here changes nothing that is found elsewhere
+    proposer = replace(proposer, generator=torch.Generator().manual_seed(0))
     shape = area.around.shape
     found = arcs(*(mask.reshape(shape).numpy() for mask in (area.inside, area.known)))
     outer, inner = ([arc for arc in found if arc.is_outer == side][:ON_CIRCLES] for side in (True, False))

@@ -15,7 +15,9 @@ import torch
 from scipy import ndimage
 
 from ..arrays import BoolArray
+from ..blend import INTERSECTION
 from ..render.tensors import Group, SceneTensors
+from .candidates import own_cover
 from .joining import Search, inserted
 from .outlining import EXACT, Area, Outlined, best_outlined
 from .region_graph import Regions
@@ -30,6 +32,7 @@ KNOWN = 0.5  # share of it that is flat regions, for any to be
 POINTS = 4000  # at most, at which an outline is looked for
 MARGIN = 0.2, 4  # around a region: share of its longer side, and pixels
 GROSSLY = 0.01  # share of it that may be wrong where the largest surroundings show it, by more than an edge
+MOSTLY = 0.5  # share of an edge beyond a shape
 HIDDEN = 0.5  # share of another region, at most, that a layer on top covers
 
 
@@ -150,9 +153,29 @@ def _holds(layer: Group, area: Area, fine: Area, regions: Regions) -> bool:
     pixels = EXACT * float(area.around.points[2] / fine.around.points[2])
     if fine.gross(layer, max(round(pixels) + 1, 2)) >= GROSSLY:
         return False
+    if INTERSECTION in [part.join for part in layer.structure] and _goes_on(layer, fine, regions):
+        return False
     covered = (fine.cover(layer) > 0.5).reshape(fine.around.shape).numpy()
     hidden = np.bincount(regions.labels[fine.part][covered], minlength=len(regions.areas) + 1)[1:]
     return not ((hidden > HIDDEN * regions.areas) & ~fine.overlay.inside).any()
+
+
+def _goes_on(layer: Group, fine: Area, regions: Regions) -> bool:
+    """Whether edges that cut a part out of a layer's first shape go on beyond it, between regions: then they are those
+    of a shape that lies on it, or under it.
+    """
+    labels, shape = regions.labels[fine.part], fine.around.shape
+    base, *others = (
+        (own_cover(layer, index, fine.around) > 0.5).reshape(shape).numpy()
+        for index in range(len(layer.structure))
+    )
+    edge = seen = 0
+    for other in others:
+        for one, next_one in ((np.s_[1:], np.s_[:-1]), (np.s_[:, 1:], np.s_[:, :-1])):
+            beyond = (other[one] != other[next_one]) & ~base[one] & ~base[next_one]
+            edge += int(beyond.sum())
+            seen += int((labels[one] != labels[next_one])[beyond].sum())
+    return seen > MOSTLY * edge
 
 
 def opaque(regions: Regions, ground: np.ndarray, whole: bool) -> Iterator[Overlay]:

@@ -15,12 +15,12 @@ from sdf2vec.fit.drawings import Drawn
 from sdf2vec.fit.peeling import peeled
 from sdf2vec.fit.region_graph import Regions
 from sdf2vec.fit.settings import settings_of
-from sdf2vec.fit.surroundings import View, error_of
-from sdf2vec.fit.transparency import bared, overlays
+from sdf2vec.fit.surroundings import Surroundings, View, error_of
+from sdf2vec.fit.transparency import Overlay, bared, overlays
 from sdf2vec.fit.views import scaled
 from sdf2vec.image import Picture
 from sdf2vec.render.tensors import SceneTensors, from_scene, to_scene
-from sdf2vec.scene import Scene
+from sdf2vec.scene import Joint, Layer, Scene
 from tests.fit.drawn import (
     BLUE,
     FINER,
@@ -34,6 +34,7 @@ from tests.fit.drawn import (
     points,
     search_of,
     sharp_disc,
+    sharp_triangle,
     view_of,
 )
 
@@ -250,6 +251,30 @@ def test_a_pie_is_a_layer_for_each_of_its_slices():
     layers = apart(painted(*slices), 48)
     assert len(layers) == 3
     assert all(layer.shapes[0].kind == "circle" for layer in layers)
+
+
+def goes_on(pixels, color, *shapes):
+    """Whether what leaves a part of a shape has edges beyond it, in the region of a colour."""
+    regions, bare = (
+        Regions.of(pixels),
+        SceneTensors([], torch.tensor([*WHITE, 1.0]).float(), "over", (1.0, 1.0)),
+    )
+    inside = np.abs(regions.colors - color).max(axis=1) < 0.02
+    outlines = peeling.Outlines(bare, [Surroundings.of(bare, 0, view_of(pixels))], search_of())
+    _, fine = outlines._areas(Overlay(1.0, color, inside, ~inside), regions)
+    layer = Layer(shapes, joints=(Joint("intersection"),))
+    (group,) = from_scene(Scene(SIDE, SIDE, (layer,), (1.0, 1.0, 1.0))).groups
+    return peeling._goes_on(group, fine, regions)
+
+
+def test_where_two_shapes_overlap_edges_go_on_and_at_a_slice_of_a_pie_they_do_not():
+    one, other = disc(38, 48, 24), disc(62, 48, 22)
+    overlap = painted((one, BLUE, 1.0), (other, RED, 1.0), (one & other, GREEN, 1.0))
+    circles = (sharp_disc(GREEN, 38, 48, 24).shapes[0], sharp_disc(GREEN, 62, 48, 22).shapes[0])
+    assert goes_on(overlap, GREEN, *circles)
+    pie = painted((disc(48, 48, 40), BLUE, 1.0), (sector(0, 90, 40), GREEN, 1.0))
+    slice_of = sharp_triangle(GREEN, (48, 48), (144, 48), (48, 144)).shapes[0]
+    assert not goes_on(pie, GREEN, sharp_disc(GREEN, 48, 48, 40).shapes[0], slice_of)
 
 
 def test_what_has_corners_is_triangles_between_them():
