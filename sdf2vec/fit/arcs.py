@@ -9,7 +9,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ..arrays import BoolArray, Float64Array
-from .contours import SHORTEST, Outline, known_outlines
+from .contours import SHORTEST, Polyline, known_outlines
 
 SHORTER = 0.8  # from one length that is looked for to the next
 ROUND = 0.2  # pixels by which the points of an arc are off its circle, in the mean of squares, at most
@@ -66,7 +66,7 @@ def arcs(inside: Float64Array, known: Float64Array) -> list[Arc]:
     return sorted(joined, key=lambda arc: -arc.points)[:MOST]
 
 
-def _line(outline: Outline) -> Float64Array:
+def _line(outline: Polyline) -> Float64Array:
     """The points of an outline; of a closed one twice, for an arc may go on behind the first."""
     points = outline.points
     return np.concatenate([points, points[1:]]) if outline.is_closed else points

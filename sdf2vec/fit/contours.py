@@ -15,7 +15,7 @@ SMOOTHED = 0.7  # pixels: standard deviation of what takes the steps of pixels o
 SHORTEST = 9  # points of a part of an outline
 
 
-class Outline(NamedTuple):
+class Polyline(NamedTuple):
     """Points (x, y) [N, 2] about a pixel apart, the middle of the first pixel at 0, 0; the last is the first again
     where it is closed.
     """
@@ -24,7 +24,7 @@ class Outline(NamedTuple):
     is_closed: bool
 
 
-def known_outlines(inside: Float64Array, known: Float64Array) -> Iterator[Outline]:
+def known_outlines(inside: Float64Array, known: Float64Array) -> Iterator[Polyline]:
     """Those of a region's coverage [H, W], and the parts of those, where it is known (0..1, [H, W])."""
     known_here = np.pad(known, 1) > 0.5
     smooth = ndimage.gaussian_filter(np.pad(inside, 1).astype(np.float64), SMOOTHED)
@@ -33,9 +33,9 @@ def known_outlines(inside: Float64Array, known: Float64Array) -> Iterator[Outlin
         is_known = known_here[low[0], low[1]] & known_here[high[0], high[1]]
         points = outline[:, ::-1] - 1.0
         if is_known.all():
-            yield Outline(points, True)
+            yield Polyline(points, True)
             continue
         breaks = np.flatnonzero(np.diff(is_known.astype(int))) + 1
         for part, own in zip(np.split(points, breaks), np.split(is_known, breaks), strict=True):
             if own[0] and len(part) >= SHORTEST:
-                yield Outline(part, False)
+                yield Polyline(part, False)

@@ -8,7 +8,7 @@ import numpy as np
 from skimage import measure
 
 from ..arrays import BoolArray, Float64Array
-from .contours import Outline, known_outlines
+from .contours import Polyline, known_outlines
 
 OFF = 0.8  # pixels that an outline may be off the sides between its corners
 ENDS = 2.0  # pixels at the ends of a side, where corners are rounded off by pixels
@@ -27,7 +27,7 @@ def corners(inside: Float64Array, known: Float64Array) -> Float64Array:
     return np.array(found if len(found) <= MOST else [], np.float64).reshape(-1, 2)
 
 
-def _of(outline: Outline) -> list[Float64Array]:
+def _of(outline: Polyline) -> list[Float64Array]:
     """Those of one outline, and its ends if it is not closed."""
     points = outline.points
     if outline.is_closed:  # from a corner on, which the farthest point from the middle is

@@ -21,7 +21,7 @@ from ..render.reference import rows_coverage
 from ..render.tensors import Group
 from .arcs import Arc, arcs
 from .candidates import Mask, Opening, Proposer, joined_sharply, own_cover, reductions
-from .covering import Covering, parted
+from .covering import TRIANGLE, Covering, parted
 from .initialization import straight
 from .joining import Search
 from .surroundings import Surroundings
@@ -33,7 +33,7 @@ EXACT = 0.36  # pixels by which an outline is off in the mean, at most
 LEAST_OFF, FINELY_OFF = 0.15, 0.08  # below that an outline is no better; in the finest surroundings
 TOGETHER = 0.27  # the same of several shapes: what round ones that have the very outline come to
 GOOD = 0.25  # share of a layer that its shape may miss, at most
-CIRCLE, TRIANGLE = "circle", "triangle"
+CIRCLE = "circle"
 ON_CIRCLES = 2  # of an outline from which others are cut, or which are
 BITTEN = 0.05  # share of what is cut out of a shape that is beyond its edge: a bite, no hole
 # of a number, in logarithms of what is missed; of shapes that are all good; of what is left of circles
@@ -211,8 +211,7 @@ class Area:
         x, y, pixel = self.around.points
         place = self.meeting(base) if is_within else self.cut(base)
         corners = torch.stack([x[0], y[0]]) + torch.from_numpy(ends).float() * pixel
-        made = place.filled(place.part(TRIANGLE, FLAT), dict(zip("abc", corners[:, None], strict=True)))
-        return [joined_sharply(made)]
+        return [place.filled(place.part(TRIANGLE, FLAT), dict(zip("abc", corners[:, None], strict=True)))]
 
     def meeting(self, base: Group) -> Opening:
         """A place for a shape of which only what it has in common with one that covers too much is left."""
@@ -279,7 +278,8 @@ def _on_circles(area: Area, proposer: Proposer) -> list[Outlined]:
             places = [area.meeting(base), area.cut(base)]
             made = [each.layer for own in proposer.candidates(places, area.around) for each in own]
             made += area.wedges(arc, base, proposer)
-            tried += map(area.outlined, [base, *made] if base is not disc else made)
+            made += [base] if base is not disc else []
+            tried += map(area.outlined, map(joined_sharply, made))
     return _distinct(
         [each for each in _sharpest(tried, area, proposer, LIKELY_ROUND) if each.off < TOGETHER]
     )[:LIKELY_ROUND]

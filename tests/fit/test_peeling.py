@@ -225,7 +225,7 @@ def sector(first, last, radius, hole=0):
 @pytest.mark.parametrize(
     ("mask", "kinds"),
     [
-        (sector(200, 290, 42), ["circle", "triangle"]),
+        (sector(200, 270, 42), ["circle", "triangle"]),
         (sector(180, 360, 42), ["circle", "box"]),
         (sector(120, 210, 42, 22), ["circle", "circle", None]),
         (sector(40, 320, 42, 26), ["circle", "circle", None]),
