@@ -129,11 +129,18 @@ def _outlines_of(layer: Layer) -> list[Outline] | None:
     for shape, part in zip(layer.shapes, layer.structure, strict=True):
         alone = Layer((shape,), layer.falloff, layer.opacity)
         outline = edge_of(alone, -0.5 if _is_cut_out(part.join) else 0.5)
-        made = None if outline is None else core(outline)
-        if outline is None or (made is not None and made[1] < 0):
+        if outline is None or not _has_area(outline):
             return None
         found.append(outline)
     return found
+
+
+def _has_area(outline: Outline) -> bool:
+    """Whether something is left of an outline that may have been moved inwards."""
+    if isinstance(outline, EllipseOutline):
+        return min(outline.radii) > 0
+    made = core(outline)
+    return made is not None and made[1] >= 0 and len(convex(made[0])) > 2
 
 
 def _pieces(outline: Outline) -> list[Piece]:

@@ -99,9 +99,10 @@ def test_an_edge_is_where_coverage_is_one_half():
         joined(circle(-0.1, 0.0, 0.2), ("union", circle(0.1, 0.0, 0.2)), smoothness=0.05),
         joined(circle(0.0, 0.0, 0.2), ("union", WAVY)),
         joined(circle(0.0, 0.0, 0.2), ("subtraction", box(0.0, 0.0, 0.4, 0.4))),
+        joined(circle(0.0, 0.0, 0.3), ("subtraction", circle(0.0, 0.0, 0.01)), falloff=0.02),
         Layer((circle(0.0, 0.0, 0.2),)),
     ],
-    ids=["smooth", "no-outline", "nothing-left", "alone"],
+    ids=["smooth", "no-outline", "nothing-left", "no-hole", "alone"],
 )
 def test_what_is_not_made_of_lines_and_arcs_is_none(layer):
     assert crossed(layer, CANVAS, 0.05) is None
