@@ -71,7 +71,8 @@ def test_starts_are_stretched_before_they_are_turned(unit, values, start):
         (units.COLOR, (-0.5, 1.5), (0.0, 1.0)),
         (units.OPACITY, (-0.5, 1.5), (0.02, 1.0)),
         (units.FALLOFF, (0.0, 1.0), (0.1, 0.9)),
-        (units.SMOOTHNESS, (0.0, 9.0), (0.001, 1.5)),
+        (units.SMOOTHNESS, (-0.1, 9.0), (0.001, 1.5)),
+        (units.SMOOTHNESS, (0.0, 1e-4), (0.0, 0.001)),  # what is sharp stays so
         (units.BACKGROUND, (-1.0, 0.5), (0.0, 0.5)),
     ],
 )
