@@ -241,6 +241,8 @@ def best_outlined(area: Area, fine: Area, search: Search) -> Outlined | None:
     best = _sharpest([best, *cut], area, proposer)[0]
     if area.overlay.opacity < 1.0:
         return best
+    # chances of its own: what is tried from here on changes nothing that is found elsewhere
+    proposer = replace(proposer, generator=torch.Generator().manual_seed(0))
     round_ones = _on_circles(area, proposer)
     if round_ones and min(each.score for each in round_ones) < best.score:
         return _finest(round_ones, area, fine, proposer, lambda each: each.priced(LEAST_OFF, CHEAP))
@@ -266,8 +268,6 @@ def _on_circles(area: Area, proposer: Proposer) -> list[Outlined]:
     """
     if CIRCLE not in proposer.kinds:
         return []
-    # chances of its own: what is tried here changes nothing that is found elsewhere
-    proposer = replace(proposer, generator=torch.Generator().manual_seed(0))
     shape = area.around.shape
     found = arcs(*(mask.reshape(shape).numpy() for mask in (area.inside, area.known)))
     outer, inner = ([arc for arc in found if arc.is_outer == side][:ON_CIRCLES] for side in (True, False))
