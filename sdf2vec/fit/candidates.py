@@ -328,9 +328,9 @@ class Proposer:
 
     def placed(self, gain: torch.Tensor, around: Surroundings) -> Placed:
         """Where shapes start: along each region of what is wanted [P], the other way round, and turned at random."""
-        x, y, pixel = around.points
-        found = torch.tensor(ellipses_of(gain.reshape(around.shape).numpy())).reshape(-1, 5)
-        centers = torch.stack([x[0], y[0]]) + (found[:, :2] - 0.5) * pixel
+        pixel = around.points[2]
+        found = torch.tensor(ellipses_of(around.plane(gain))).reshape(-1, 5)
+        centers = around.places(found[:, :2] - 0.5)
         sizes = (found[:, 2] * found[:, 3]).sqrt() * pixel
         longer = (found[:, 2] / found[:, 3]).sqrt() / LONGER**0.5
         stretches = torch.stack([longer, 1.0 / longer], dim=1)

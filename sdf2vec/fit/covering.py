@@ -59,7 +59,7 @@ class Covering:
     looks: Group
     around: Surroundings
     proposer: Proposer
-    has_corners: bool = False  # whether triangles between corners of its outline are tried, too
+    has_corners: bool = False  # whether triangles between corners of its outline are laid, no bars
 
     def layers(self) -> Iterator[Group]:
         """Layers of two, three and more shapes joined sharply, which cover ever more; none once that gets hopeless."""
@@ -77,17 +77,16 @@ class Covering:
                 yield layer
 
     def _with_one_more(self, layer: Group, left: torch.Tensor) -> Group | None:
-        """A layer with the shape that covers most of what is left [P], and little else; None where no bar is."""
-        shape, too_much = self.around.shape, (self.known - self.inside).clamp_min(0.0)
-        bar = widest((left > 0.5).reshape(shape).numpy(), (too_much < 0.5).reshape(shape).numpy())
-        if bar is None:
+        """A layer with the shape that covers most of what is left [P], and little else; None where none does."""
+        too_much = (self.known - self.inside).clamp_min(0.0)
+        if not ((left > 0.5) & (too_much < 0.5)).any():
             return None
         index = len(layer.structure)
         mask = Mask(left + STRICT * too_much, left, 0.0)
         place = Opening(layer, index, UNION if index else "", self.color, mask)
-        tried = self._triangles(place, left, too_much) if self.has_corners else self._along(bar, place, left)
+        lay_out = self._triangles if self.has_corners else self._along_bar
         best, most = layer, 0.0
-        for made in tried:
+        for made in lay_out(place, left, too_much):
             cover = own_cover(made, index, self.around)
             gain = float((cover * (left - STRICT * too_much)).sum())
             gain *= 1.0 if self.has_corners else SIMPLE.get(made.structure[index].kind, OTHER)
@@ -95,8 +94,11 @@ class Covering:
                 best, most = made, gain
         return joined_sharply(best) if most else None
 
-    def _along(self, bar: Bar, place: Opening, left: torch.Tensor) -> list[Group]:
-        """The layer with shapes of every kind from where a bar is, and from what is left [P]."""
+    def _along_bar(self, place: Opening, left: torch.Tensor, too_much: torch.Tensor) -> list[Group]:
+        """The layer with shapes of every kind from where the largest bar is, and from what is left [P]."""
+        bar = widest(self.around.plane(left > 0.5), self.around.plane(too_much < 0.5))
+        if bar is None:
+            return []
         starts = [self._placed(bar), self.proposer.placed(left, self.around)]
         return [
             made
@@ -104,33 +106,33 @@ class Covering:
             for _, made in self.proposer.optima(kind, [place] * 2, starts, self.around, STARTS)
         ]
 
+    def _triangles(self, place: Opening, left: torch.Tensor, too_much: torch.Tensor) -> list[Group]:
+        """The layer with triangles between corners of the outline that cover most of what is left [P]."""
+        if TRIANGLE not in self.proposer.kinds:
+            return []
+        planes = self.around.plane(left), self.around.plane(STRICT * too_much)
+        return [with_triangle(place, ends, self.around) for ends in triangles(self._corners, *planes, STARTS)]
+
     @cached_property
     def _corners(self) -> Float64Array:
         """Of its outline, [N, 2] in pixels."""
-        return corners(*(mask.reshape(self.around.shape).numpy() for mask in (self.inside, self.known)))
-
-    def _triangles(self, place: Opening, left: torch.Tensor, too_much: torch.Tensor) -> list[Group]:
-        """The layer with triangles between corners of the outline that cover most of what is left [P]."""
-        if not self.has_corners or TRIANGLE not in self.proposer.kinds:
-            return []
-        wanted, unwanted = (mask.reshape(self.around.shape).numpy() for mask in (left, STRICT * too_much))
-        x, y, pixel = self.around.points
-        first, part = torch.stack([x[0], y[0]]), place.part(TRIANGLE, FLAT)
-        found = []
-        for ends in triangles(self._corners, wanted, unwanted, STARTS):
-            at = first + torch.from_numpy(ends).float() * pixel
-            found.append(place.filled(part, dict(zip("abc", at[:, None], strict=True))))
-        return found
+        return corners(self.around.plane(self.inside), self.around.plane(self.known))
 
     def _placed(self, bar: Bar) -> Placed:
         """Where shapes start that are to be where a bar is."""
-        x, y, pixel = self.around.points
+        pixel = self.around.points[2]
         length, width = ((half + 0.5) * pixel for half in bar.half)
         size = (length * width).sqrt()
         own = next(p.start for p in KINDS[BOX].parameters if len(p.start) == 2 and p.positive)
         stretches = torch.stack([length / own[0], width / own[1]]) / size
-        middle = torch.from_numpy(bar.middle) * pixel + torch.stack([x[0], y[0]])
+        middle = self.around.places(torch.from_numpy(bar.middle))
         return Placed(middle[None].float(), size[None], torch.tensor([bar.turn]), stretches[None])
+
+
+def with_triangle(place: Opening, ends: Float64Array, around: Surroundings) -> Group:
+    """The layer with a triangle [3, 2] in pixels in a place."""
+    at = around.places(torch.from_numpy(ends).float())
+    return place.filled(place.part(TRIANGLE, FLAT), dict(zip("abc", at[:, None], strict=True)))
 
 
 def parted(layer: Group) -> list[Group]:

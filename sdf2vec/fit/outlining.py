@@ -21,7 +21,7 @@ from ..render.reference import rows_coverage
 from ..render.tensors import Group
 from .arcs import Arc, arcs
 from .candidates import Mask, Opening, Proposer, joined_sharply, own_cover, reductions
-from .covering import TRIANGLE, Covering, parted
+from .covering import TRIANGLE, Covering, parted, with_triangle
 from .initialization import straight
 from .joining import Search
 from .surroundings import Surroundings
@@ -125,9 +125,7 @@ class Area:
     @cached_property
     def edge(self) -> float:
         """The length of its outline in pixels, where it is known."""
-        inside, known = (
-            (mask > 0.5).reshape(self.around.shape).numpy() for mask in (self.inside, self.known)
-        )
+        inside, known = (self.around.plane(mask > 0.5) for mask in (self.inside, self.known))
         return float(max((inside & ndimage.binary_dilation(known & ~inside)).sum(), 1))
 
     def outlined(self, layer: Group) -> Outlined:
@@ -145,8 +143,8 @@ class Area:
 
     def gross(self, layer: Group, pixels: int) -> float:
         """The share of it that a layer covers wrongly in squares of so many pixels: elsewhere its edge is off."""
-        wrong = ((self.cover(layer) * self.known - self.inside).abs() > 0.5).reshape(self.around.shape)
-        squares = ndimage.binary_opening(wrong.numpy(), np.ones((pixels, pixels)))
+        wrong = self.around.plane((self.cover(layer) * self.known - self.inside).abs() > 0.5)
+        squares = ndimage.binary_opening(wrong, np.ones((pixels, pixels)))
         return float(squares.sum()) / max(float(self.inside.sum()), TINY)
 
     def _is_bitten(self, layer: Group) -> bool:
@@ -172,7 +170,7 @@ class Area:
 
     def hull(self) -> torch.Tensor:
         """Where it may be if it is convex: others may hide parts of it, [P]."""
-        around = convex_hull_image((self.inside > 0.5).reshape(self.around.shape).numpy())
+        around = convex_hull_image(self.around.plane(self.inside > 0.5))
         return torch.from_numpy(around).flatten() * (1.0 - self.known + self.inside)
 
     @property
@@ -197,21 +195,18 @@ class Area:
 
     def on(self, arc: Arc, place: Opening) -> Group:
         """The layer with a circle that an outline runs along in a place."""
-        x, y, pixel = self.around.points
-        middle = torch.stack([x[0] + arc.x * pixel, y[0] + arc.y * pixel])
-        circle = {"center": middle[None], "radius": torch.full((1, 1), arc.radius) * pixel}
+        middle = self.around.places(torch.tensor([[arc.x, arc.y]]))
+        circle = {"center": middle, "radius": torch.full((1, 1), arc.radius) * self.around.points[2]}
         return place.filled(place.part(CIRCLE, FLAT), circle)
 
     def wedges(self, arc: Arc, base: Group, proposer: Proposer) -> list[Group]:
         """A layer of which a triangle from the middle of a circle leaves what is seen, or takes away the rest."""
-        found = arc.wedge(self.inside.reshape(self.around.shape).numpy())
+        found = arc.wedge(self.around.plane(self.inside))
         if found is None or TRIANGLE not in proposer.kinds:
             return []
         is_within, ends = found
-        x, y, pixel = self.around.points
         place = self.meeting(base) if is_within else self.cut(base)
-        corners = torch.stack([x[0], y[0]]) + torch.from_numpy(ends).float() * pixel
-        return [place.filled(place.part(TRIANGLE, FLAT), dict(zip("abc", corners[:, None], strict=True)))]
+        return [with_triangle(place, ends, self.around)]
 
     def meeting(self, base: Group) -> Opening:
         """A place for a shape of which only what it has in common with one that covers too much is left."""
@@ -268,8 +263,7 @@ def _on_circles(area: Area, proposer: Proposer) -> list[Outlined]:
     """
     if CIRCLE not in proposer.kinds:
         return []
-    shape = area.around.shape
-    found = arcs(*(mask.reshape(shape).numpy() for mask in (area.inside, area.known)))
+    found = arcs(area.around.plane(area.inside), area.around.plane(area.known))
     outer, inner = ([arc for arc in found if arc.is_outer == side][:ON_CIRCLES] for side in (True, False))
     tried: list[Outlined] = []
     for arc in outer:

@@ -155,7 +155,7 @@ def _holds(layer: Group, area: Area, fine: Area, regions: Regions) -> bool:
         return False
     if INTERSECTION in [part.join for part in layer.structure] and _goes_on(layer, fine, regions):
         return False
-    covered = (fine.cover(layer) > 0.5).reshape(fine.around.shape).numpy()
+    covered = fine.around.plane(fine.cover(layer) > 0.5)
     hidden = np.bincount(regions.labels[fine.part][covered], minlength=len(regions.areas) + 1)[1:]
     return not ((hidden > HIDDEN * regions.areas) & ~fine.overlay.inside).any()
 
@@ -164,10 +164,9 @@ def _goes_on(layer: Group, fine: Area, regions: Regions) -> bool:
     """Whether edges that cut a part out of a layer's first shape go on beyond it, between regions: then they are those
     of a shape that lies on it, or under it.
     """
-    labels, shape = regions.labels[fine.part], fine.around.shape
+    labels, around = regions.labels[fine.part], fine.around
     base, *others = (
-        (own_cover(layer, index, fine.around) > 0.5).reshape(shape).numpy()
-        for index in range(len(layer.structure))
+        around.plane(own_cover(layer, index, around) > 0.5) for index in range(len(layer.structure))
     )
     edge = seen = 0
     for other in others:

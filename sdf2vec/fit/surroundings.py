@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 from functools import cached_property, partial
 from typing import NamedTuple
 
+import numpy as np
 import torch
 
 from ..layer import ROW_OPACITY, Structure
@@ -109,6 +110,15 @@ class Surroundings:
     def shape(self) -> tuple[int, int]:
         """Height and width in pixels."""
         return self.target.shape[1], self.target.shape[2]
+
+    def plane(self, values: torch.Tensor) -> np.ndarray:
+        """Values at the points [P] as an array [H, W]."""
+        return values.reshape(self.shape).numpy()
+
+    def places(self, pixels: torch.Tensor) -> torch.Tensor:
+        """Points (x, y) [N, 2] in scene units of some in pixels; the middle of the first pixel is 0, 0."""
+        x, y, pixel = self.points
+        return pixels * pixel + torch.stack([x[0], y[0]])
 
     def window(self, rows: slice, columns: slice) -> Surroundings:
         """A part of them."""

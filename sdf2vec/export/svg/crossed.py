@@ -240,18 +240,13 @@ def _loops(pieces: Sequence[Piece]) -> list[list[Piece]]:
     left, loops = list(pieces), []
     while left:
         loop = [left.pop(0)]
-        while np.linalg.norm(loop[-1].end - loop[0].begin) > MEETS or _is_speck(loop):
+        while np.linalg.norm(loop[-1].end - loop[0].begin) > MEETS:
             apart = [np.linalg.norm(loop[-1].end - each.begin) for each in left]
             if not apart or min(apart) > MEETS:
                 return []
             loop.append(left.pop(int(np.argmin(apart))))
         loops.append(_fewer(loop))
     return loops
-
-
-def _is_speck(loop: Sequence[Piece]) -> bool:
-    """Whether a loop is closed only because it is shorter than what tells two ends apart."""
-    return sum(piece.length for piece in loop) < 4.0 * MEETS
 
 
 def _fewer(loop: list[Piece]) -> list[Piece]:

@@ -26,9 +26,13 @@ class Arc(NamedTuple):
     end: Point
 
 
-Segment = (
-    tuple[Point, ...] | Arc
-)  # without its start; of points a Bézier curve: one is a line, three are a cubic
+# without its start; of points a Bézier curve: one is a line, three are a cubic
+Segment = tuple[Point, ...] | Arc
+
+
+def points_of(segment: Segment) -> tuple[Point, ...]:
+    """Those that tell a segment: of an arc its end."""
+    return (segment.end,) if isinstance(segment, Arc) else segment
 
 
 class Contour(NamedTuple):
@@ -56,7 +60,7 @@ class Contour(NamedTuple):
     @property
     def points(self) -> list[Point]:
         """Those that its segments tell, but the start."""
-        return [p for each in self.segments for p in ((each.end,) if isinstance(each, Arc) else each)]
+        return [point for segment in self.segments for point in points_of(segment)]
 
 
 @dataclass(frozen=True)

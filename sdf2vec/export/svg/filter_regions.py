@@ -178,6 +178,5 @@ def box_of(geometry: Geometry) -> Points:
         return 2.0 * np.array(geometry.half_size)
     if isinstance(geometry, PolygonOutline):
         return np.asarray(np.ptp(np.array(geometry.points), axis=0))
-    assert isinstance(geometry, Path), "only what is sharp is several outlines"
     points = [point for contour in geometry.contours for point in contour.points]
     return np.asarray(np.ptp(np.array(points), axis=0))

@@ -153,8 +153,7 @@ def distances(layer: Layer, grid: SampleGrid) -> Float64Array:
 
 def distance_of(layer: Layer, places: Float64Array) -> Float64Array:
     """Signed distances [N] from a layer of points [N, 2]."""
-    count = 5 if len(layer.shapes) > MANY else 1
-    found = _formula(layer.structure, count)(*places.T, 0.0, *layer.numbers)[0]
+    found = _formula(layer.structure, 1)(*places.T, 0.0, *layer.numbers)[0]
     return np.asarray(np.broadcast_to(found, len(places)), np.float64)
 
 

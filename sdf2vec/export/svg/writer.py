@@ -32,6 +32,7 @@ from .display import (
     Path,
     RadialGradient,
     Stop,
+    points_of,
 )
 from .filter_regions import Region, region_of, region_of_group, rounding_of, shared_regions
 from .outlines import convex, sides
@@ -321,7 +322,7 @@ class _Writer:
         begins, last = ("m", "l") if alone and contour.begins_straight else ("M", "")
         parts = [f"{begins}{self.fine(x)} {self.fine(y)}"]
         for segment in contour.segments:
-            points = (segment.end,) if isinstance(segment, Arc) else segment
+            points = points_of(segment)
             steps = [
                 (round(a - x, self.drawing.digits), round(b - y, self.drawing.digits)) for a, b in points
             ]
