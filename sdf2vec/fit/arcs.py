@@ -16,7 +16,7 @@ ROUND = 0.2  # pixels by which the points of an arc are off its circle, in the m
 LEAST_TURN = 0.7  # radians of an arc
 LEAST_RISE = 1.5  # pixels between an arc and its chord, at least
 SAME = 1.5  # pixels by which the centres and radii of two arcs of one circle differ, at most
-MOST = 8  # arcs of an outline
+MOST, FEWEST = 8, 0.15  # arcs of an outline; points of one, in shares of those of the longest
 NARROWEST, WIDEST = 0.1, 2.4  # radians of a wedge
 BEYOND = 1.1  # radii that a wedge reaches in its middle
 
@@ -46,10 +46,16 @@ class Arc(NamedTuple):
         span, is_within = (math.tau - gap, True) if gap > math.pi else (gap, False)
         if not NARROWEST < span < WIDEST:
             return None
-        first = end - span if is_within else end
-        ways = np.array([[math.cos(turn), math.sin(turn)] for turn in (first, first + span)])
         middle = np.array([self.x, self.y])
-        return is_within, np.stack([middle, *(middle + BEYOND * self.radius / math.cos(span / 2) * ways)])
+        return is_within, wedge(middle, self.radius, end - span if is_within else end, span)
+
+
+def wedge(middle: Float64Array, radius: float, first: float, span: float) -> Float64Array:
+    """A triangle [3, 2] from the middle of a circle that holds the part of its disc from an angle on, by so many
+    radians, `WIDEST` at most.
+    """
+    ways = np.array([[math.cos(turn), math.sin(turn)] for turn in (first, first + span)])
+    return np.stack([middle, *(middle + BEYOND * radius / math.cos(span / 2) * ways)])
 
 
 def arcs(inside: Float64Array, known: Float64Array) -> list[Arc]:
@@ -62,8 +68,8 @@ def arcs(inside: Float64Array, known: Float64Array) -> list[Arc]:
             circles.append([(sums, arc)])
         else:
             same.append((sums, arc))
-    joined = [_joined(own) for own in circles]
-    return sorted(joined, key=lambda arc: -arc.points)[:MOST]
+    joined = sorted((_joined(own) for own in circles), key=lambda arc: -arc.points)[:MOST]
+    return [arc for arc in joined if arc.points >= FEWEST * joined[0].points]
 
 
 def _line(outline: Polyline) -> Float64Array:
@@ -75,11 +81,17 @@ def _line(outline: Polyline) -> Float64Array:
 Sums = Float64Array  # of products of (x, y, 1, x² + y²), [4, 4]
 
 
-def _along(line: Float64Array) -> Iterator[tuple[Sums, Arc]]:
-    """Arcs of a line, the longest first, that share no points."""
+def sums_of(line: Float64Array) -> Sums:
+    """Those of the first 0, 1, 2, … points of a line [N, 2], [N + 1, 4, 4]."""
     powers = np.concatenate([line, np.ones((len(line), 1)), (line**2).sum(1, keepdims=True)], axis=1)
     sums = np.zeros((len(line) + 1, 4, 4))
     np.cumsum(powers[:, :, None] * powers[:, None], axis=0, out=sums[1:])
+    return sums
+
+
+def _along(line: Float64Array) -> Iterator[tuple[Sums, Arc]]:
+    """Arcs of a line, the longest first, that share no points."""
+    sums = sums_of(line)
     free: BoolArray = np.ones(len(line), bool)
     length = len(line)
     while length >= SHORTEST:
@@ -88,7 +100,7 @@ def _along(line: Float64Array) -> Iterator[tuple[Sums, Arc]]:
         starts = starts[taken[starts + length] == taken[starts]]
         while len(starts):
             own = sums[starts + length] - sums[starts]
-            circles, off = _circles(own)
+            circles, off = circles_of(own)
             chords = np.hypot(*(line[starts + length - 1] - line[starts]).T)
             good = np.flatnonzero((off < ROUND) & _is_bent(circles[:, 2], chords, length))
             if not len(good):
@@ -110,8 +122,9 @@ def _is_bent(radii: Float64Array, chords: Float64Array, length: int) -> BoolArra
     return bent
 
 
-def _circles(sums: Float64Array) -> tuple[Float64Array, Float64Array]:
+def circles_of(sums: Sums) -> tuple[Float64Array, Float64Array]:
     """Circles (x, y, radius) [N, 3] by least squares of x² + y² (Kåsa 1976), and by how many pixels points are off."""
+    means, sums = _centred(sums)
     matrix, right = sums[:, :3, :3], sums[:, :3, 3]
     eye = np.eye(3) * 1e-9 * np.trace(matrix, axis1=1, axis2=2)[:, None, None]
     solved = np.linalg.solve(matrix + eye, right[..., None])[..., 0]
@@ -119,7 +132,16 @@ def _circles(sums: Float64Array) -> tuple[Float64Array, Float64Array]:
     radii = np.sqrt(np.maximum(solved[:, 2] + (centers**2).sum(1), 1e-9))
     squares = sums[:, 3, 3] - (solved * right).sum(1)
     off = np.sqrt(np.maximum(squares, 0.0) / matrix[:, 2, 2]) / (2.0 * radii)
-    return np.concatenate([centers, radii[:, None]], axis=1), off
+    return np.concatenate([centers + means, radii[:, None]], axis=1), off
+
+
+def _centred(sums: Sums) -> tuple[Float64Array, Sums]:
+    """The means (x, y) [N, 2] of points, and the sums as they are where these are at 0, 0."""
+    means = sums[:, :2, 2] / sums[:, 2, 2, None]
+    moved = np.broadcast_to(np.eye(4), sums.shape).copy()
+    moved[:, :2, 2] = -means
+    moved[:, 3, :2], moved[:, 3, 2] = -2.0 * means, (means**2).sum(1)
+    return means, moved @ sums @ moved.transpose(0, 2, 1)
 
 
 def _arc(circle: Float64Array, points: Float64Array) -> Arc:
@@ -137,6 +159,6 @@ def _are_one(a: Arc, b: Arc) -> bool:
 
 def _joined(own: list[tuple[Sums, Arc]]) -> Arc:
     """The circle of several arcs."""
-    circles, _ = _circles(np.sum([sums for sums, _ in own], axis=0)[None])
+    circles, _ = circles_of(np.sum([sums for sums, _ in own], axis=0)[None])
     x, y, radius = circles[0].tolist()
     return Arc(x, y, radius, own[0][1].is_outer, sum(arc.points for _, arc in own))

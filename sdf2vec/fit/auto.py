@@ -25,7 +25,7 @@ from ..scene import Scene
 from ..threads import threads_of_its_own
 from .backends import CPU, choose
 from .byte_budget import Share, within
-from .descents import Sizes, descended, finished, softer
+from .descents import Sizes, descended, finished, sharper, softer
 from .description import description_length
 from .digits import concise, fit_concisely
 from .drawings import Drawn, is_photograph
@@ -368,7 +368,7 @@ class Drawing:
             hope = THOROUGH if few else USUAL
             self.scene = pruned(self.scene, sizes, search, self.floor, hope)
         self.scene = simplified(self.scene, sizes.joint, search, worst)
-        self.scene = finished(self.scene, sizes, search)
+        self.scene = sharper(finished(self.scene, sizes, search), sizes, search)
         self.scene = self._briefer(self.floor)
         self.scene = sharing(self.scene, sizes.last, worst)
 

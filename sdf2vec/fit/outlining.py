@@ -4,214 +4,30 @@ circles that the outline runs along, and several that cover the area together.
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
-from functools import cached_property
+from dataclasses import replace
 
-import numpy as np
 import torch
-from scipy import ndimage
-from skimage.morphology import convex_hull_image
 
-from ..blend import INTERSECTION, SUBTRACTION
-from ..layer import LOOK, Slot, Structure, row_width
-from ..paints import FLAT
-from ..render.reference import rows_coverage
+from ..layer import Structure
 from ..render.tensors import Group
 from .arcs import Arc, arcs
-from .candidates import Mask, Opening, Proposer, joined_sharply, own_cover, reductions
-from .covering import TRIANGLE, Covering, parted, with_triangle
-from .initialization import straight
+from .areas import CIRCLE, EXACT, LEAST_OFF, Area, Outlined
+from .candidates import Opening, Proposer, joined_sharply, reductions
+from .covering import Covering
 from .joining import Search
-from .surroundings import Surroundings
-from .transparency import Overlay
-from .windows import Part
+from .stroking import stroked
 
 STARTS, BASES = 6, 3  # of a kind of shape; shapes from which others are cut
-EXACT = 0.36  # pixels by which an outline is off in the mean, at most
-LEAST_OFF, FINELY_OFF = 0.15, 0.08  # below that an outline is no better; in the finest surroundings
+# pixels in the finest surroundings: an outline that is off by less is no better; what has it is not made of strokes
+FINELY_OFF, FINELY_EXACT = 0.08, 0.22
 TOGETHER = 0.27  # the same of several shapes: what round ones that have the very outline come to
-GOOD = 0.25  # share of a layer that its shape may miss, at most
-CIRCLE = "circle"
 ON_CIRCLES = 2  # of an outline from which others are cut, or which are
-BITTEN = 0.05  # share of what is cut out of a shape that is beyond its edge: a bite, no hole
-# of a number, in logarithms of what is missed; of shapes that are all good; of what is left of circles
-PRICE, DEAR, CHEAP = 0.04, 0.15, 0.01
+DEAR, CHEAP = 0.15, 0.01  # price of a number of shapes that are all good; of what is left of circles
 EAGER = 0.25  # how much it matters what is covered too much, where it may be cut away
 # structures whose outlines are sharpened in the end; of what is left of circles, which differ less; steps of each
 LIKELY, LIKELY_ROUND, STEPS = 3, 6, 10
 HOPEFUL = 3.0  # pixels by which these are off
-TINY = 1e-9
-
-
-@dataclass(frozen=True)
-class Outlined:
-    """A layer of one shape, or of several that are joined, for an overlay.
-
-    `off`: by how many pixels its outline is off, in the mean; `missed`: the share of the overlay that is wrong;
-    `bitten`: whether what is cut out of it goes beyond its edge; `soft`: whether the overlay's edge is.
-    """
-
-    layer: Group
-    overlay: Overlay
-    off: float
-    missed: float
-    bitten: bool
-    soft: bool
-
-    @property
-    def score(self) -> float:
-        """What is the less the better."""
-        return self.priced(LEAST_OFF, PRICE)
-
-    def priced(self, least: float, price: float) -> float:
-        """The same where it is no better that an outline is off by less than the least, and each number has a price."""
-        return math.log(max(self.off, least)) + price * row_width(self.layer.structure)
-
-    @property
-    def is_good(self) -> bool:
-        """Whether it has the overlay's outline."""
-        return self.off < EXACT and self.missed < GOOD
-
-    @property
-    def is_joined(self) -> bool:
-        """Whether something is cut out of it."""
-        return len(self.layer.structure) > 1
-
-    @property
-    def layers(self) -> list[Group]:
-        """The same as layers of one shape each, if nothing is cut out of it."""
-        return parted(self.layer) if all(part.adds for part in self.layer.structure) else [self.layer]
-
-    @property
-    def is_opaque(self) -> bool:
-        return self.overlay.opacity == 1.0
-
-    @property
-    def rank(self) -> tuple[bool, bool, int, float]:
-        """What is the less the likelier: of translucent layers what explains the most regions is."""
-        covered = 0 if self.is_opaque else -int(self.overlay.inside.sum())
-        return self.bitten, self.is_joined, covered, self.score
-
-    @property
-    def is_plain(self) -> bool:
-        """Whether it is one opaque shape."""
-        return self.is_opaque and not self.is_joined
-
-    def lies_under(self, other: Outlined) -> bool:
-        """Whether another one shows what is under it where this one is."""
-        return bool((self.overlay.inside & other.overlay.outside).any())
-
-
-@dataclass(frozen=True)
-class Area:
-    """Where an overlay is, [P], and where it is known whether it is, [P], in a window of some surroundings."""
-
-    overlay: Overlay
-    inside: torch.Tensor
-    known: torch.Tensor
-    part: Part  # that window of the surroundings
-    around: Surroundings
-    soft: bool  # its edge
-
-    @property
-    def key(self) -> tuple[bytes, ...]:
-        """What its outline follows from."""
-        x, y, pixel = self.around.points
-        ends = torch.stack([x[0], y[0], pixel])
-        return tuple(tensor.numpy().tobytes() for tensor in (self.inside, self.known, ends))
-
-    @cached_property
-    def edge(self) -> float:
-        """The length of its outline in pixels, where it is known."""
-        inside, known = (self.around.plane(mask > 0.5) for mask in (self.inside, self.known))
-        return float(max((inside & ndimage.binary_dilation(known & ~inside)).sum(), 1))
-
-    def outlined(self, layer: Group) -> Outlined:
-        """How well a layer covers it."""
-        return self.all_outlined([layer])[0]
-
-    def all_outlined(self, layers: Sequence[Group]) -> list[Outlined]:
-        """The same of some layers of one structure."""
-        wrong = (self._covers(layers) * self.known - self.inside).abs().sum(1)
-        size = max(float(self.inside.sum()), TINY)
-        return [
-            Outlined(layer, self.overlay, off / self.edge, off / size, self._is_bitten(layer), self.soft)
-            for layer, off in zip(layers, wrong.tolist(), strict=True)
-        ]
-
-    def gross(self, layer: Group, pixels: int) -> float:
-        """The share of it that a layer covers wrongly in squares of so many pixels: elsewhere its edge is off."""
-        wrong = self.around.plane((self.cover(layer) * self.known - self.inside).abs() > 0.5)
-        squares = ndimage.binary_opening(wrong, np.ones((pixels, pixels)))
-        return float(squares.sum()) / max(float(self.inside.sum()), TINY)
-
-    def _is_bitten(self, layer: Group) -> bool:
-        """Whether a shape that is cut out of the first goes beyond its edge, or one that leaves a part of it does."""
-        joins = [part.join for part in layer.structure]
-        if INTERSECTION in joins:
-            return True
-        base, *cuts = (own_cover(layer, index, self.around) for index in range(len(joins)))
-        return any(
-            (cut * (1.0 - base)).sum() > BITTEN * cut.sum()
-            for cut, join in zip(cuts, joins[1:], strict=True)
-            if join == SUBTRACTION
-        )
-
-    def cover(self, layer: Group) -> torch.Tensor:
-        """Coverage [P] of a layer without its opacity."""
-        return self._covers([layer])[0]
-
-    def _covers(self, layers: Sequence[Group]) -> torch.Tensor:
-        """The same [G, P] of layers of one structure."""
-        rows, compositing = torch.cat([layer.rows() for layer in layers]), self.around.scene.compositing
-        return rows_coverage(layers[0].structure, rows[..., None], compositing, *self.around.points)[0]
-
-    def hull(self) -> torch.Tensor:
-        """Where it may be if it is convex: others may hide parts of it, [P]."""
-        around = convex_hull_image(self.around.plane(self.inside > 0.5))
-        return torch.from_numpy(around).flatten() * (1.0 - self.known + self.inside)
-
-    @property
-    def color(self) -> torch.Tensor:
-        """The straight colour [1, 3] of the overlay."""
-        return straight(torch.tensor(self.overlay.color[None], dtype=torch.float32))[:, :3]
-
-    def opening(self, too_much: float = 1.0) -> Opening:
-        """A place for its first shape; by how much it matters what that covers too much."""
-        opacity, edge = (Slot(None, parameter) for parameter in LOOK)
-        alpha = self.overlay.opacity * float(self.overlay.color[3] if len(self.overlay.color) == 4 else 1.0)
-        looks = {opacity: torch.tensor([[alpha]]), edge: torch.zeros(1, 1)}
-        matters = self.known * torch.where(self.inside > 0, 1.0, too_much)
-        mask = Mask(matters, self.inside, 0.0)
-        return Opening(Group((), torch.tensor([0]), looks), 0, "", self.color, mask)
-
-    def cut(self, base: Group) -> Opening:
-        """A place for a shape that is cut out of one which covers too much."""
-        matters = self.known * self.cover(base)
-        too_much = (matters - self.inside).clamp_min(0.0)
-        return Opening(base, len(base.structure), SUBTRACTION, self.color, Mask(matters, too_much, 0.0))
-
-    def on(self, arc: Arc, place: Opening) -> Group:
-        """The layer with a circle that an outline runs along in a place."""
-        middle = self.around.places(torch.tensor([[arc.x, arc.y]]))
-        circle = {"center": middle, "radius": torch.full((1, 1), arc.radius) * self.around.points[2]}
-        return place.filled(place.part(CIRCLE, FLAT), circle)
-
-    def wedges(self, arc: Arc, base: Group, proposer: Proposer) -> list[Group]:
-        """A layer of which a triangle from the middle of a circle leaves what is seen, or takes away the rest."""
-        found = arc.wedge(self.around.plane(self.inside))
-        if found is None or TRIANGLE not in proposer.kinds:
-            return []
-        is_within, ends = found
-        place = self.meeting(base) if is_within else self.cut(base)
-        return [with_triangle(place, ends, self.around)]
-
-    def meeting(self, base: Group) -> Opening:
-        """A place for a shape of which only what it has in common with one that covers too much is left."""
-        matters = self.known * self.cover(base)
-        return Opening(base, len(base.structure), INTERSECTION, self.color, Mask(matters, self.inside, 0.0))
 
 
 def best_outlined(area: Area, fine: Area, search: Search) -> Outlined | None:
@@ -238,6 +54,10 @@ def best_outlined(area: Area, fine: Area, search: Search) -> Outlined | None:
         return best
     # chances of its own: what is tried from here on changes nothing that is found elsewhere
     proposer = replace(proposer, generator=torch.Generator().manual_seed(0))
+    if fine.outlined(best.layer).off >= FINELY_EXACT and (layers := stroked(fine, proposer)):
+        drawn = area.outlined_together(layers)
+        if drawn.off < TOGETHER:
+            return drawn
     round_ones = _on_circles(area, proposer)
     if round_ones and min(each.score for each in round_ones) < best.score:
         return _finest(round_ones, area, fine, proposer, lambda each: each.priced(LEAST_OFF, CHEAP))
@@ -267,8 +87,8 @@ def _on_circles(area: Area, proposer: Proposer) -> list[Outlined]:
     outer, inner = ([arc for arc in found if arc.is_outer == side][:ON_CIRCLES] for side in (True, False))
     tried: list[Outlined] = []
     for arc in outer:
-        disc = area.on(arc, area.opening())
-        for base in (disc, *(area.on(hole, area.cut(disc)) for hole in inner)):
+        disc = _with_arc(arc, area, area.opening())
+        for base in (disc, *(_with_arc(hole, area, area.cut(disc)) for hole in inner)):
             places = [area.meeting(base), area.cut(base)]
             made = [each.layer for own in proposer.candidates(places, area.around) for each in own]
             made += area.wedges(arc, base, proposer)
@@ -277,6 +97,11 @@ def _on_circles(area: Area, proposer: Proposer) -> list[Outlined]:
     return _distinct(
         [each for each in _sharpest(tried, area, proposer, LIKELY_ROUND) if each.off < TOGETHER]
     )[:LIKELY_ROUND]
+
+
+def _with_arc(arc: Arc, area: Area, place: Opening) -> Group:
+    """The layer with the circle of an arc in a place."""
+    return area.with_circle(arc.x, arc.y, arc.radius, place)
 
 
 def _together(area: Area, fine: Area, proposer: Proposer) -> Outlined | None:
@@ -343,5 +168,5 @@ def _single(area: Area, opening: Opening, proposer: Proposer) -> list[Outlined]:
 
 def _eager(tried: Outlined, area: Area) -> float:
     """What is missed where what is covered too much matters less."""
-    cover = area.cover(tried.layer)
+    cover = area.cover([tried.layer])
     return float(((1 - cover) * area.inside + EAGER * cover * (area.known - area.inside)).sum())

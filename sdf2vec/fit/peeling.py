@@ -17,9 +17,10 @@ from scipy import ndimage
 from ..arrays import BoolArray
 from ..blend import INTERSECTION
 from ..render.tensors import Group, SceneTensors
+from .areas import EXACT, Area, Outlined
 from .candidates import own_cover
 from .joining import Search, inserted
-from .outlining import EXACT, Area, Outlined, best_outlined
+from .outlining import best_outlined
 from .region_graph import Regions
 from .surroundings import Surroundings, View
 from .transparency import Overlay, bared, overlays
@@ -101,7 +102,7 @@ class Outlines:
                 break
             area, fine = self._areas(overlay, regions)
             best = self._of(area, fine)
-            if best is not None and best.is_good and _holds(best.layer, area, fine, regions):
+            if best is not None and best.is_good and _holds(best, area, fine, regions):
                 found.append(replace(best, overlay=overlay))
         return found
 
@@ -148,16 +149,21 @@ def _apart(ranked: Sequence[Outlined], regions: Regions) -> list[Outlined]:
     return taken
 
 
-def _holds(layer: Group, area: Area, fine: Area, regions: Regions) -> bool:
-    """Whether a layer covers its overlay in the finest surroundings as well as where it was found, and nothing else."""
+def _holds(best: Outlined, area: Area, fine: Area, regions: Regions) -> bool:
+    """Whether layers cover their overlay in the finest surroundings as well as where found, and nothing else."""
     pixels = EXACT * float(area.around.points[2] / fine.around.points[2])
-    if fine.gross(layer, max(round(pixels) + 1, 2)) >= GROSSLY:
+    if fine.gross(best.all, max(round(pixels) + 1, 2)) >= GROSSLY:
         return False
-    if INTERSECTION in [part.join for part in layer.structure] and _goes_on(layer, fine, regions):
+    if any(_goes_on(layer, fine, regions) for layer in best.all if _is_met(layer)):
         return False
-    covered = fine.around.plane(fine.cover(layer) > 0.5)
+    covered = fine.around.plane(fine.cover(best.all) > 0.5)
     hidden = np.bincount(regions.labels[fine.part][covered], minlength=len(regions.areas) + 1)[1:]
     return not ((hidden > HIDDEN * regions.areas) & ~fine.overlay.inside).any()
+
+
+def _is_met(layer: Group) -> bool:
+    """Whether only what shapes have in common is left of it."""
+    return INTERSECTION in [part.join for part in layer.structure]
 
 
 def _goes_on(layer: Group, fine: Area, regions: Regions) -> bool:

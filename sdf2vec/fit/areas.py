@@ -1,0 +1,249 @@
+"""Where an overlay is and where that is known, and how well layers cover it."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+import torch
+from scipy import ndimage
+from skimage.morphology import convex_hull_image
+
+from ..arrays import Float64Array
+from ..blend import INTERSECTION, SUBTRACTION, UNION
+from ..layer import LOOK, Slot, row_width
+from ..paints import FLAT
+from ..render.reference import rows_coverage
+from ..render.tensors import Group
+from .arcs import Arc
+from .candidates import Mask, Opening, Proposer, own_cover
+from .covering import TRIANGLE, parted, with_triangle
+from .initialization import straight
+from .surroundings import Surroundings
+from .transparency import Overlay
+from .windows import Part
+
+EXACT = 0.36  # pixels by which an outline is off in the mean, at most
+LEAST_OFF = 0.15  # below that an outline is no better
+GOOD = 0.25  # share of a layer that its shape may miss, at most
+BITTEN = 0.05  # share of what is cut out of a shape that is beyond its edge: a bite, no hole
+PRICE = 0.04  # of a number, in logarithms of what is missed
+FULL, BLURRED = np.ones((3, 3)), 2  # pixels on both sides of an edge that may be of both colours
+CIRCLE = "circle"
+TINY = 1e-9
+
+
+@dataclass(frozen=True)
+class Outlined:
+    """A layer of one shape, or of several that are joined, for an overlay; of strokes `more` layers with it.
+
+    `off`: by how many pixels its outline is off, in the mean; `missed`: the share of the overlay that is wrong;
+    `bitten`: whether what is cut out of it goes beyond its edge; `soft`: whether the overlay's edge is.
+    """
+
+    layer: Group
+    overlay: Overlay
+    off: float
+    missed: float
+    bitten: bool
+    soft: bool
+    more: tuple[Group, ...] = ()
+
+    @property
+    def score(self) -> float:
+        """What is the less the better."""
+        return self.priced(LEAST_OFF, PRICE)
+
+    def priced(self, least: float, price: float) -> float:
+        """The same where it is no better that an outline is off by less than the least, and each number has a price."""
+        return math.log(max(self.off, least)) + price * row_width(self.layer.structure)
+
+    @property
+    def is_good(self) -> bool:
+        """Whether it has the overlay's outline."""
+        return self.off < EXACT and self.missed < GOOD
+
+    @property
+    def is_joined(self) -> bool:
+        """Whether it is of several shapes."""
+        return len(self.layer.structure) > 1 or bool(self.more)
+
+    @property
+    def layers(self) -> list[Group]:
+        """Its layers, those out of which nothing is cut as layers of one shape each."""
+        return [
+            one
+            for layer in self.all
+            for one in (parted(layer) if all(part.adds for part in layer.structure) else [layer])
+        ]
+
+    @property
+    def all(self) -> tuple[Group, ...]:
+        """Its layers."""
+        return self.layer, *self.more
+
+    @property
+    def is_opaque(self) -> bool:
+        return self.overlay.opacity == 1.0
+
+    @property
+    def rank(self) -> tuple[bool, bool, int, float]:
+        """What is the less the likelier: of translucent layers what explains the most regions is."""
+        covered = 0 if self.is_opaque else -int(self.overlay.inside.sum())
+        return self.bitten, self.is_joined, covered, self.score
+
+    @property
+    def is_plain(self) -> bool:
+        """Whether it is one opaque shape."""
+        return self.is_opaque and not self.is_joined
+
+    def lies_under(self, other: Outlined) -> bool:
+        """Whether another one shows what is under it where this one is."""
+        return bool((self.overlay.inside & other.overlay.outside).any())
+
+
+@dataclass(frozen=True)
+class Area:
+    """Where an overlay is, [P], and where it is known whether it is, [P], in a window of some surroundings."""
+
+    overlay: Overlay
+    inside: torch.Tensor
+    known: torch.Tensor
+    part: Part  # that window of the surroundings
+    around: Surroundings
+    soft: bool  # its edge
+
+    @property
+    def key(self) -> tuple[bytes, ...]:
+        """What its outline follows from."""
+        x, y, pixel = self.around.points
+        ends = torch.stack([x[0], y[0], pixel])
+        return tuple(tensor.numpy().tobytes() for tensor in (self.inside, self.known, ends))
+
+    @cached_property
+    def edge(self) -> float:
+        """The length of its outline in pixels, where it is known."""
+        inside, known = (self.around.plane(mask > 0.5) for mask in (self.inside, self.known))
+        return float(max((inside & ndimage.binary_dilation(known & ~inside)).sum(), 1))
+
+    @cached_property
+    def coverage(self) -> Float64Array:
+        """How much of each pixel it covers [H, W]: at its edge by where the pixel's colour is between its own and that
+        of what is beside it.
+        """
+        inside = self.around.plane(self.inside > 0.5)
+        near, core = (
+            ndimage.binary_dilation(inside, FULL, BLURRED),
+            ndimage.binary_erosion(inside, FULL, BLURRED, border_value=1),
+        )
+        if near.all():
+            return inside.astype(np.float64)
+        rows, columns = ndimage.distance_transform_edt(near, return_distances=False, return_indices=True)
+        pixels = self.around.target.numpy().astype(np.float64)
+        beside = pixels[:, rows, columns]
+        change = self.overlay.color[:, None, None] - beside
+        share = ((pixels - beside) * change).sum(0) / np.maximum((change**2).sum(0), TINY)
+        return np.where(near & ~core, np.clip(share, 0.0, 1.0), inside)
+
+    def outlined(self, layer: Group) -> Outlined:
+        """How well a layer covers it."""
+        return self.all_outlined([layer])[0]
+
+    def outlined_together(self, layers: Sequence[Group]) -> Outlined:
+        """How well some layers cover it that lie on each other."""
+        first, *more = layers
+        off = float((self.cover(layers) * self.known - self.inside).abs().sum())
+        size = max(float(self.inside.sum()), TINY)
+        return Outlined(first, self.overlay, off / self.edge, off / size, False, self.soft, tuple(more))
+
+    def all_outlined(self, layers: Sequence[Group]) -> list[Outlined]:
+        """The same of some layers of one structure."""
+        wrong = (self._covers(layers) * self.known - self.inside).abs().sum(1)
+        size = max(float(self.inside.sum()), TINY)
+        return [
+            Outlined(layer, self.overlay, off / self.edge, off / size, self._is_bitten(layer), self.soft)
+            for layer, off in zip(layers, wrong.tolist(), strict=True)
+        ]
+
+    def gross(self, layers: Sequence[Group], pixels: int) -> float:
+        """The share of it that layers cover wrongly in squares of so many pixels: elsewhere their edge is off."""
+        wrong = self.around.plane((self.cover(layers) * self.known - self.inside).abs() > 0.5)
+        squares = ndimage.binary_opening(wrong, np.ones((pixels, pixels)))
+        return float(squares.sum()) / max(float(self.inside.sum()), TINY)
+
+    def _is_bitten(self, layer: Group) -> bool:
+        """Whether a shape that is cut out of the first goes beyond its edge, or one that leaves a part of it does."""
+        joins = [part.join for part in layer.structure]
+        if INTERSECTION in joins:
+            return True
+        base, *cuts = (own_cover(layer, index, self.around) for index in range(len(joins)))
+        return any(
+            (cut * (1.0 - base)).sum() > BITTEN * cut.sum()
+            for cut, join in zip(cuts, joins[1:], strict=True)
+            if join == SUBTRACTION
+        )
+
+    def cover(self, layers: Sequence[Group]) -> torch.Tensor:
+        """Coverage [P] of layers that lie on each other, without their opacity."""
+        left = torch.ones_like(self.inside)
+        for layer in layers:
+            left = left * (1.0 - self._covers([layer])[0])
+        return 1.0 - left
+
+    def _covers(self, layers: Sequence[Group]) -> torch.Tensor:
+        """The same [G, P] of layers of one structure."""
+        rows, compositing = torch.cat([layer.rows() for layer in layers]), self.around.scene.compositing
+        return rows_coverage(layers[0].structure, rows[..., None], compositing, *self.around.points)[0]
+
+    def hull(self) -> torch.Tensor:
+        """Where it may be if it is convex: others may hide parts of it, [P]."""
+        around = convex_hull_image(self.around.plane(self.inside > 0.5))
+        return torch.from_numpy(around).flatten() * (1.0 - self.known + self.inside)
+
+    @property
+    def color(self) -> torch.Tensor:
+        """The straight colour [1, 3] of the overlay."""
+        return straight(torch.tensor(self.overlay.color[None], dtype=torch.float32))[:, :3]
+
+    def opening(self, too_much: float = 1.0) -> Opening:
+        """A place for its first shape; by how much it matters what that covers too much."""
+        opacity, edge = (Slot(None, parameter) for parameter in LOOK)
+        alpha = self.overlay.opacity * float(self.overlay.color[3] if len(self.overlay.color) == 4 else 1.0)
+        looks = {opacity: torch.tensor([[alpha]]), edge: torch.zeros(1, 1)}
+        matters = self.known * torch.where(self.inside > 0, 1.0, too_much)
+        mask = Mask(matters, self.inside, 0.0)
+        return Opening(Group((), torch.tensor([0]), looks), 0, "", self.color, mask)
+
+    def cut(self, base: Group) -> Opening:
+        """A place for a shape that is cut out of one which covers too much."""
+        matters = self.known * self.cover([base])
+        too_much = (matters - self.inside).clamp_min(0.0)
+        return Opening(base, len(base.structure), SUBTRACTION, self.color, Mask(matters, too_much, 0.0))
+
+    def with_circle(self, x: float, y: float, radius: float, place: Opening) -> Group:
+        """The layer with a circle, in pixels, in a place."""
+        middle = self.around.places(torch.tensor([[x, y]]))
+        circle = {"center": middle, "radius": torch.full((1, 1), radius) * self.around.points[2]}
+        return place.filled(place.part(CIRCLE, FLAT), circle)
+
+    def joining(self, base: Group) -> Opening:
+        """A place for one more shape that is joined to a layer."""
+        mask = Mask(self.known, self.inside, 0.0)
+        return Opening(base, len(base.structure), UNION, self.color, mask)
+
+    def wedges(self, arc: Arc, base: Group, proposer: Proposer) -> list[Group]:
+        """A layer of which a triangle from the middle of a circle leaves what is seen, or takes away the rest."""
+        found = arc.wedge(self.around.plane(self.inside))
+        if found is None or TRIANGLE not in proposer.kinds:
+            return []
+        is_within, ends = found
+        place = self.meeting(base) if is_within else self.cut(base)
+        return [with_triangle(place, ends, self.around)]
+
+    def meeting(self, base: Group) -> Opening:
+        """A place for a shape of which only what it has in common with one that covers too much is left."""
+        matters = self.known * self.cover([base])
+        return Opening(base, len(base.structure), INTERSECTION, self.color, Mask(matters, self.inside, 0.0))

@@ -1,0 +1,117 @@
+"""Frames among strokes: four lines, and bows between them, that go around a rectangle."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+from itertools import combinations
+
+import numpy as np
+
+from ..arrays import BoolArray, Float64Array
+from .strokes import BLUNT, Line, Stroke
+
+STRAIGHT = 0.03  # sine of the angle by which sides are not parallel, or not at right angles, at most
+WITHIN = 0.97  # share of a frame that lies in the region, and of a stroke that is a part of it
+SURELY, HARDLY = 0.8, 0.25  # pixels within its edge of what a frame surely covers; of what is half covered
+STEP, SIDES = 0.5, 4  # pixels between radii that are tried; lines of a frame, at least
+
+
+@dataclass(frozen=True, eq=False)
+class Frame:
+    """A stroke around a rectangle about a middle [2] in pixels; its own sides are half as long as `sides`, turned by an
+    angle; the radius is that of the stroke's middle line at corners.
+    """
+
+    middle: Float64Array
+    sides: tuple[float, float]
+    angle: float
+    radius: float
+    half: float
+
+    @property
+    def length(self) -> float:
+        return 4.0 * sum(self.sides)
+
+    def covers(self, points: Float64Array, more: float = BLUNT) -> BoolArray:
+        """Which points [N, 2] it covers, or lie so few pixels beyond its edge."""
+        along = np.array([math.cos(self.angle), math.sin(self.angle)])
+        away = points - self.middle
+        own = np.abs(np.stack([away @ along, away @ np.array([-along[1], along[0]])], axis=1))
+        beyond = own - np.array(self.sides) + self.radius
+        off = np.linalg.norm(np.maximum(beyond, 0.0), axis=1) + np.minimum(beyond.max(axis=1), 0.0)
+        return np.asarray(np.abs(off - self.radius) <= self.half + more)
+
+
+def framed(found: Sequence[Stroke], inside: BoolArray) -> list[Stroke | Frame]:
+    """Strokes of a region [H, W] with frames in place of those that go around rectangles."""
+    lines = [stroke for stroke in found if isinstance(stroke, Line)]
+    frames: list[Frame] = []
+    left = list(found)
+    for sharp in sorted(_rectangles(lines), key=lambda frame: -frame.length):
+        frame = _rounded(sharp, inside)
+        if _lies_in(frame, inside):
+            parts = [stroke for stroke in left if _is_part(stroke, frame, inside)]
+            if sum(isinstance(part, Line) for part in parts) >= SIDES:
+                frames.append(frame)
+                left = [stroke for stroke in left if stroke not in parts]
+    return [*frames, *left]
+
+
+def _rectangles(lines: Sequence[Line]) -> Iterator[Frame]:
+    """Frames, without a radius, of which two pairs of lines may be the sides."""
+    pairs = [(one, other) for one, other in combinations(lines, 2) if _across(one, other) < STRAIGHT]
+    for along, across in combinations(pairs, 2):
+        if abs(_direction(along[0]) @ _direction(across[0])) < STRAIGHT:
+            frame = _frame(along, across)
+            if min(frame.sides) > frame.half:
+                yield frame
+
+
+def _frame(along: tuple[Line, Line], across: tuple[Line, Line]) -> Frame:
+    """The one whose middle line goes along two lines and two others at right angles to them."""
+    x = _direction(along[0])
+    y = np.array([-x[1], x[0]])
+    (top, bottom), (left, right) = (
+        sorted(float((line.start + line.end) @ way) / 2.0 for line in pair)
+        for pair, way in ((along, y), (across, x))
+    )
+    middle = x * (left + right) / 2.0 + y * (top + bottom) / 2.0
+    half = float(np.mean([line.half for line in (*along, *across)]))
+    return Frame(middle, ((right - left) / 2.0, (bottom - top) / 2.0), math.atan2(x[1], x[0]), 0.0, half)
+
+
+def _rounded(frame: Frame, inside: BoolArray) -> Frame:
+    """A frame with the radius with which it differs least from a region."""
+    points = _points(np.ones_like(inside))
+    tried = [replace(frame, radius=float(radius)) for radius in np.arange(0.0, min(frame.sides), STEP)]
+    return min(tried, key=lambda each: int((each.covers(points, -HARDLY) != inside.reshape(-1)).sum()))
+
+
+def _points(mask: BoolArray) -> Float64Array:
+    """The pixels (x, y) of a mask, [N, 2]."""
+    return np.stack(np.nonzero(mask)[::-1], axis=1).astype(np.float64)
+
+
+def _direction(line: Line) -> Float64Array:
+    return line.direction(line.start)
+
+
+def _across(one: Line, other: Line) -> float:
+    """The sine of the angle between two lines."""
+    (a, b), (c, d) = _direction(one), _direction(other)
+    return abs(float(a * d - b * c))
+
+
+def _lies_in(frame: Frame, inside: BoolArray) -> bool:
+    """Whether nearly all of a frame is in a region."""
+    own = frame.covers(_points(np.ones_like(inside)), -SURELY)
+    return bool(own.any()) and float(inside.reshape(-1)[own].mean()) > WITHIN
+
+
+def _is_part(stroke: Stroke, frame: Frame, inside: BoolArray) -> bool:
+    """Whether nearly all that a stroke covers of a region is a frame's."""
+    points = _points(inside)
+    own = points[stroke.covers(points)]
+    return bool(len(own)) and float(frame.covers(own).mean()) > WITHIN
