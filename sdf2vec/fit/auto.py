@@ -36,6 +36,7 @@ from .loop import Callback, Progress, Stopped
 from .mending import SLIGHTLY, exchanged, merged
 from .offers import common_color
 from .one_more import gain_of_one_more
+from .pens import lined
 from .presets import Phase
 from .pruning import BRIEF, FLOOR, THOROUGH, USUAL, pruned
 from .ramps import KIND, grounded
@@ -370,7 +371,7 @@ class Drawing:
         self.scene = simplified(self.scene, sizes.joint, search, worst)
         self.scene = sharper(finished(self.scene, sizes, search), sizes, search)
         self.scene = self._briefer(self.floor)
-        self.scene = sharing(self.scene, sizes.last, worst)
+        self.scene = sharing(lined(self.scene, sizes.last, search, worst), sizes.last, worst)
 
     def _briefer(self, worst: float) -> SceneTensors:
         """The scene without what is needless now that all is simple, where it is told as shortly."""

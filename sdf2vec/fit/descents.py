@@ -30,7 +30,7 @@ SOFT = 2.0  # pixels of the picture where all descend: edges that may become sof
 SOFTENED, FOUND = 0.8, 10**-3  # of the error before, and mean squared error, at most, after edges became soft
 # pixels of falloff, where a picture is seen largest, of what may be sharp; times the mean squared
 # error that it may then have, or so much: 44 dB
-NEARLY_SHARP, ABOUT, ANYWAY = 2.5, 1.35, 10**-4.4
+NEARLY_SHARP, ABOUT, ANYWAY = 2.5, 1.5, 10**-4.4
 
 
 class Sizes(NamedTuple):

@@ -20,6 +20,7 @@ from ..scene import Scene
 from ..shapes import KINDS
 from ..steps import Steps
 from ..units import COLOR, FALLOFF, OPACITY, POSITION
+from .pens import in_one_width, strokes_of, with_round_ends
 from .presets import MSE, Phase
 from .runs import Softening
 from .settling import GOING_ON, PHASES, Kept, Settling, Views, descend
@@ -119,6 +120,9 @@ def _softest(group: Group) -> float:
 
 
 def _ended(tensors: SceneTensors, scene: Scene, softening: Softening | None) -> Drawable:
+    for group, before in zip(tensors.groups, from_scene(scene).groups, strict=True):
+        with_round_ends(group, strokes_of(before))
+        in_one_width(group, before)
     runs = softening.ended if softening else ()
     return Drawable(to_scene(tensors, scene.width, scene.height), runs)
 

@@ -19,7 +19,7 @@ from ...outlines import EllipseOutline, Outline, PolygonOutline
 from ...render.occlusion import showing
 from ...scene import Layer, Scene
 from .blur import best_traced, trial_of
-from .canvas import Canvas, pairs
+from .canvas import Canvas, Points, pairs
 from .display import Drawing, Figure, Geometry, Group, Item, Path
 from .outlines import Traced, core, distance_to, edge_of, placed
 from .refit_appearance import HASTY, Difference, refitted
@@ -31,6 +31,7 @@ from .visibility import LayerSamples, contrasts, layers_at
 # User units or, if that is more, pixels of the fitted picture that a traced contour may be off.
 TOLERANCE = 0.5, 0.15
 STRAYED = 0.2  # of a contour's tolerance, that curves are off: the root of the mean square
+RECTANGLE, THIN = 4, 1.0  # corners; user units that it is wide where it is a line
 ROUNDED = 1.0 / 12.0  # mean squared change of a number that is rounded to a whole one
 
 
@@ -163,10 +164,19 @@ def _whole(outline: Outline, canvas: Canvas) -> Geometry:
     """An outline in user units, of a polygon and a rounding or an ellipse with radii of one unit or more."""
     if (made := core(outline)) is not None:
         points, rounding = made
-        return PolygonOutline(pairs(canvas.places(points)), rounding * canvas.unit)
+        return PolygonOutline(pairs(_thinned(canvas.places(points))), rounding * canvas.unit)
     geometry = placed(outline, canvas)
     assert isinstance(geometry, EllipseOutline)
     return replace(geometry, radii=(max(geometry.radii[0], 1.0), max(geometry.radii[1], 1.0)))
+
+
+def _thinned(points: Points) -> Points:
+    """The corners of a polygon [N, 2]; of a rectangle that has no width the two ends of a line."""
+    if len(points) == RECTANGLE:
+        for ends in (points, np.roll(points, 1, axis=0)):
+            if np.linalg.norm(ends[::2] - ends[1::2], axis=1).max() < THIN:
+                return (ends[::2] + ends[1::2]) / 2.0
+    return points
 
 
 def _rounded(geometry: Geometry, canvas: Canvas) -> Geometry:

@@ -6,9 +6,10 @@ import hashlib
 import math
 import re
 from collections import Counter
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
 from functools import singledispatchmethod
+from itertools import groupby
 from typing import Any
 from xml.etree import ElementTree
 from xml.sax.saxutils import escape
@@ -44,16 +45,20 @@ Attributes = dict[str, str | None]
 PREFIX = "@@"  # of ids, until the content that makes it is known
 NEEDLESS = ("version", "baseProfile", "xmlns:ev", "xmlns:xlink")  # that svgwrite puts at the root
 SHARED = ("fill", "fill-rule", "shape-rendering")  # attributes that a group says for all its items
+LINE = 2  # points of a polygon that is a line
 FLAT = 0.05  # user units: a rounding below it is none
-STROKES = {"fill": "currentColor", "stroke": "currentColor", "stroke-width": "0", "stroke-linejoin": "round"}
+STROKES = {"stroke-width": "0", "stroke-linejoin": "round"}
+# said by a class, never by a group: CairoSVG and Inkscape take the group's own colour for it then
+OWN_COLOR = ";fill:currentColor;stroke:currentColor"
 
 
 @dataclass(frozen=True)
 class Style:
     """How a drawing is written. `named`: with the figures' names as ids; `sized`: with a width and a height.
 
-    `compact`: each figure with as few words as there are. Colour is `currentColor`, said once, the softness a class,
-    a polygon's rounding a stroke. One more filter is worth blurring the share `filter` of the canvas' pixels in vain.
+    `compact`: each figure with as few words as there are. The softness is a class, a polygon's rounding a stroke, in
+    `currentColor` where the class can say that. One more filter is worth blurring the share `filter` of the canvas'
+    pixels in vain.
     """
 
     named: bool = True
@@ -98,9 +103,11 @@ class _Writer:
         drawing, body = self.drawing, self.svg
         if drawing.ground is not None:
             body.add(body.rect((None, None), ("100%", "100%"), **_ground_fill(drawing.ground)))
-        items = [self.item(item) for item in drawing.items]
+        items = list(self._elements())
         if self.strokes:
             body = self.svg.add(self.svg.g(**STROKES))
+            if any(is_line(figure.geometry) for figure in drawing.figures):
+                body["stroke-linecap"] = "round"
         for item in items:
             body.add(item)
         if self.classes:
@@ -109,6 +116,18 @@ class _Writer:
         if not self.svg.defs.elements:
             self.svg.elements.remove(self.svg.defs)
         return _lean(self.svg.get_xml())
+
+    def _elements(self) -> Iterator[Element]:
+        """One for each item, or for a run of lines that are drawn with the same pen."""
+        for pen, run in groupby(self.drawing.items, pen_of):
+            first, *rest = run
+            if pen is None or not rest or not self.strokes:
+                yield from map(self.item, (first, *rest))
+                continue
+            figures = [item for item in (first, *rest) if isinstance(item, Figure)]
+            lines = [each.geometry for each in figures if isinstance(each.geometry, PolygonOutline)]
+            data = "".join(self._line(line, alone=False) for line in lines)
+            yield self._with(self.svg.path(data), self._look(figures[0]))
 
     def item(self, item: Item) -> Element:
         """A figure or a group; what a group's figures have in common is said by it."""
@@ -138,15 +157,17 @@ class _Writer:
         rounding = rounding_of(figure)
         look: Attributes = {"opacity": opacity_text(figure.opacity)}
         paint = self.paint(figure.fill, figure)
-        if self.strokes and isinstance(figure.fill, tuple):
+        is_said_once = self.strokes and figure.blur > 0.0 and isinstance(figure.fill, tuple)
+        if is_said_once:
             look["color"] = paint
         else:
-            look |= {"fill": paint, "stroke": paint if rounding else None}
+            look |= {"fill": None if pen_of(figure) else paint, "stroke": paint if rounding else None}
         stroke = self.number(2.0 * rounding) if rounding else None
         if figure.blur:
             usual = stroke and rounding == self.roundings.get(figure.blur)
             rule = f";stroke-width:{self.fine(2.0 * rounding)}" if usual else ""
-            look["class"] = self._class(f"filter:{self._filter(figure)}{rule}")
+            own = OWN_COLOR if is_said_once else ""
+            look["class"] = self._class(f"filter:{self._filter(figure)}{own}{rule}")
             stroke = None if usual else stroke
         return look | {"stroke-width": stroke}
 
@@ -292,11 +313,17 @@ class _Writer:
 
     def _ways_round(self, polygon: PolygonOutline) -> list[str]:
         corners = np.array(polygon.points)
+        if len(corners) == LINE:
+            return [self._line(polygon), self._line(replace(polygon, points=polygon.points[::-1]))]
         return [
             self._relative(Contour.straight(pairs(np.roll(way, -first, axis=0))))
             for way in (corners, corners[::-1])
             for first in range(len(corners))
         ]
+
+    def _line(self, line: PolygonOutline, alone: bool = True) -> str:
+        """Path data of a polygon of two points, which is not closed: its ends are round."""
+        return self._relative(Contour.straight(line.points), alone).removesuffix("z")
 
     def _closed(self, outline: PolygonOutline) -> str:
         """Path data of a polygon: straight edges moved outwards, joined by arcs."""
@@ -349,6 +376,19 @@ class _Writer:
     def fine(self, value: float) -> str:
         """A number that directions hang on: with two decimals more."""
         return number(value, self.drawing.digits + 2)
+
+
+def is_line(geometry: Geometry) -> bool:
+    """Whether it is a line from point to point, of which only the rounding is to be seen."""
+    return isinstance(geometry, PolygonOutline) and len(geometry.points) == LINE
+
+
+def pen_of(item: Item) -> tuple[Color, float] | None:
+    """The colour and the rounding of what is a line, neither blurred nor translucent; None for all else."""
+    if not isinstance(item, Figure) or not isinstance(item.geometry, PolygonOutline):
+        return None
+    is_plain = is_line(item.geometry) and item.opacity == 1.0 and not item.blur
+    return (item.fill, item.geometry.rounding) if is_plain and isinstance(item.fill, tuple) else None
 
 
 def _attributes(region: Region) -> dict[str, str]:

@@ -15,7 +15,7 @@ from sdf2vec.export.options import Options
 from sdf2vec.export.svg import small_svg
 from sdf2vec.fit.drawable import rounded
 from sdf2vec.grain import GRAINS
-from tests.export.svg.drawings import NAMESPACE, made, rendered, text_of
+from tests.export.svg.drawings import BLACK, NAMESPACE, ORANGE, made, rendered, text_of, triangle
 from tests.scenes import random_shape
 
 
@@ -72,3 +72,28 @@ def test_a_tighter_limit_takes_no_more_from_the_picture_than_it_must(softest, re
         steps[0] > -1.5
     )  # where all are sharp the finest small one is nearer: its colours are rounded together
     assert steps.max() < 8.0, found
+
+
+BLUE = (0.2, 0.4, 1.0)
+
+
+def rounded_box(x, y, color, falloff=0.0):
+    shape = Shape.of("box", color, center=(x, y), half_size=(0.25, 0.15), angle=0.4, corner_radius=0.08)
+    return Layer((shape,), falloff, 0.9)
+
+
+@pytest.mark.parametrize("size", [(150, 100), (411, 274)])
+@pytest.mark.parametrize(("name", "softest"), [("inkscape", 0.0), ("inkscape", 0.12), ("cairosvg", 0.0)])
+def test_who_takes_a_groups_colour_for_the_current_one_draws_each_shape_in_its_own(
+    name, softest, size, require_engine
+):
+    """Everything was black. CairoSVG blurs nothing, so that only sharp shapes are as they should be."""
+    require_engine(name)
+    layers = (rounded_box(-0.3, -0.1, ORANGE, softest), rounded_box(0.3, 0.1, BLUE, softest))
+    scene = Scene(
+        150, 100, (*layers, triangle((-0.2, 0.4), (0.2, 0.4), (0.0, -0.4), falloff=softest / 2)), BLACK
+    )
+    text = str(small_svg(rounded(scene, GRAINS[0]), Options(), GRAINS[0]).data)
+    wrong = ENGINES[name].render(text, *size) - rendered(scene, *size)
+    assert -10 * np.log10(np.mean(wrong**2)) > 32
+    assert abs(wrong[..., :3].mean()) < 0.005

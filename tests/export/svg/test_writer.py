@@ -113,9 +113,9 @@ def test_compact_words():
     assert usual.attrib["d"] in ("m10 10 20 0-20 20z", "m30 10-20 20 0-20z", "m10 30 0-20 20 0z")
     assert "stroke-width" not in usual.attrib
     assert other.get("stroke-width") == "14"
-    rules = root.findtext(f"{NAMESPACE}style", "")
-    assert re.search(rf"\.{usual.get('class')}{{filter:url\(#\w+\);stroke-width:8}}", rules)
-    assert re.search(rf"\.{other.get('class')}{{filter:url\(#\w+\)}}", rules)
+    rules, colors = root.findtext(f"{NAMESPACE}style", ""), ";fill:currentColor;stroke:currentColor"
+    assert re.search(rf"\.{usual.get('class')}{{filter:url\(#\w+\){colors};stroke-width:8}}", rules)
+    assert re.search(rf"\.{other.get('class')}{{filter:url\(#\w+\){colors}}}", rules)
 
 
 def test_a_turned_ellipse():

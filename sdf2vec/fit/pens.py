@@ -1,0 +1,87 @@
+"""Strokes of one pen: long boxes that end in half discs, of one width where theirs hardly differ."""
+
+from __future__ import annotations
+
+import torch
+
+from ..render.tensors import Group, SceneTensors
+from .constraints import ALMOST
+from .joining import Search, detached, inserted
+from .least_squares import is_simple
+from .simplify import UNSEEN
+from .surroundings import Surroundings, View, error_of, layer_at
+
+STEPS = 10  # of a box whose corners have become round
+LONG = 1.5  # times as long as wide
+ALIKE, SAME = 0.06, 1e-4  # logarithm of what widths of one pen differ by; of what they do when they are one
+AS_GOOD = 1.1  # times the mean squared error, at most
+
+
+def lined(scene: SceneTensors, view: View, search: Search, worst: float) -> SceneTensors:
+    """The scene with long boxes as strokes where that is as good, in one width where theirs hardly differ."""
+    error = error_of(scene, view)
+    limit = max(worst, AS_GOOD * error, error + 4.0 * UNSEEN)
+    for order in range(scene.layer_count):
+        layer = layer_at(scene, order)
+        if bool(_are_long(layer).any()):
+            made = inserted(scene, _rounded(layer, Surroundings.of(scene, order, view), search))
+            scene = made if error_of(made, view) <= limit else scene
+    made = detached(scene)
+    for group in made.groups:
+        in_one_width(group, group, ALIKE)
+    return made if error_of(made, view) <= limit else scene
+
+
+def _rounded(layer: Group, around: Surroundings, search: Search) -> Group:
+    """A layer of a box with round ends, whose other numbers have moved a little."""
+    made = layer.each(lambda tensor: tensor.detach().clone())
+    with_round_ends(made, torch.tensor([True]))
+    still = {slot for slot, v in made.values.items() if v.numel() == 1 and is_simple(slot, float(v))}
+    corner = made.of("corner_radius", 0)
+    found = search.trained(
+        made, around, STEPS, lambda slot: slot not in still and made.values[slot] is not corner
+    ).layer
+    with_round_ends(found, torch.tensor([True]))
+    return found
+
+
+def strokes_of(group: Group) -> torch.Tensor:
+    """Which layers [G] of a group are strokes."""
+    long = _are_long(group)
+    if not bool(long.any()):
+        return long
+    return long & (group.of("corner_radius", 0) >= ALMOST**2 * _widths(group))[:, 0]
+
+
+def _are_long(group: Group) -> torch.Tensor:
+    """Which layers [G] are one box each that is longer than wide."""
+    if [part.kind for part in group.structure] != ["box"]:
+        return torch.zeros(len(group), dtype=torch.bool)
+    return group.of("half_size", 0).amax(1) > LONG * _widths(group)[:, 0]
+
+
+def _widths(group: Group) -> torch.Tensor:
+    """Half the widths of boxes [G, 1]."""
+    return group.of("half_size", 0).amin(1, keepdim=True)
+
+
+@torch.no_grad()
+def with_round_ends(group: Group, which: torch.Tensor) -> None:
+    """Gives some boxes [G] round ends, in place."""
+    if bool(which.any()):
+        corners = group.of("corner_radius", 0)
+        corners.copy_(torch.where(which[:, None], ALMOST * _widths(group), corners))
+
+
+@torch.no_grad()
+def in_one_width(group: Group, before: Group, alike: float = SAME) -> None:
+    """Makes the widths of strokes, in place, those of others that were about as wide before."""
+    left = strokes_of(group).nonzero()[:, 0]
+    old = _widths(before)[:, 0].log() if len(left) else left
+    while len(left):
+        own = left[(old[left] - old[left[0]]).abs() < alike]
+        width = _widths(group)[own, 0].median()
+        sides = group.of("half_size", 0)
+        sides[own, sides[own].argmin(1)] = width
+        group.of("corner_radius", 0)[own] = ALMOST * width
+        left = left[~torch.isin(left, own)]
