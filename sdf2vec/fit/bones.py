@@ -14,16 +14,12 @@ from ..arrays import BoolArray, Float64Array
 EVEN = 0.15, 0.8  # by which half the width differs along a line, at most: share of it, and pixels
 MOSTLY = 0.8  # share of all lines along which it does not
 LONGER = 2.0  # than wide: all of them together, at least
-SPUR, PASSES = (
-    1.1,
-    3,
-)  # widths: a shorter branch with a free end is what a corner makes; times they are taken off
+# widths: a shorter branch with a free end is what a corner makes; times they are taken off
+SPUR, PASSES = 1.1, 3
 CLEAR = 0.8  # half widths around where branches meet: there they are bent
 LEAST = 5  # points that a line is told by
-EDGE, PATH = (
-    0.5,
-    2.0,
-)  # standard deviations in pixels of what takes the steps of pixels off edges, and off a path
+# standard deviations in pixels of what takes the steps of pixels off edges, and off a path
+EDGE, PATH = 0.5, 2.0
 REACH, SAMPLED = 1.5, 0.25  # widths on both sides where edges are looked for; pixels between samples
 
 

@@ -17,10 +17,8 @@ STRIDE = 2  # points between those at which a line may become a bow
 CLOSED = 1.5  # pixels between the ends of a path around
 ROUGH = 0.5  # pixels that points are off where they are of one piece, many of them together
 LINE, BOW = 30.0, 36.0  # what a piece costs beside squared distances, in units of that
-STRAIGHT, NEARLY = (
-    0.3,
-    0.5,
-)  # radians that a bow turns, at least; share of that where it is clear of what joins it
+# radians that a bow turns, at least; share of that where it is clear of what joins it
+STRAIGHT, NEARLY = 0.3, 0.5
 TIGHTEST = 1.25  # half widths of a bow's radius, at least: else it is a corner
 TOUCHES, ALONG = 1.0, 0.95  # pixels between two that touch; cosine of the angle between two that go on
 FINE = 0.25  # pixels: steps in which a stroke gets longer
