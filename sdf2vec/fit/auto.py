@@ -153,10 +153,13 @@ def _searched(drawn: Drawn, settings: Settings, callback: Callback) -> Fitted | 
     if settings.shapes == AUTO:
         return None if drawing.gave_up else _needed(drawing, found, callback)
     found = drawing.sharpened(found)
+    is_whole = settings.shapes == found.shape_count and settings.loss is None
+    if is_whole and drawing.error <= drawing.floor:  # a fit that goes on would only follow the antialiasing
+        return _told(found, picture, settings)
     going_on = _going_on(settings, found)
     anew = [settings] if _is_some(settings) and found.layers and drawing.error > drawing.good else []
     made = [fit_concisely(picture, each, callback) for each in (going_on, *anew)]
-    if settings.shapes == found.shape_count and settings.loss is None:
+    if is_whole:
         made.append(found)
     return _told(_nearest(made, picture), picture, settings)
 

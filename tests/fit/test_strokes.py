@@ -5,10 +5,16 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
+import torch
 
 import sdf2vec
 from sdf2vec.fit.frames import Frame, framed
+from sdf2vec.fit.peeling import peeled
 from sdf2vec.fit.strokes import Bow, Line, strokes
+from sdf2vec.fit.surroundings import View
+from sdf2vec.fit.views import scaled
+from sdf2vec.render.tensors import SceneTensors, to_scene
+from tests.fit.drawn import search_of, view_of
 from tests.fit.stroked import FINER, bow, frame, line, seen, x, y
 
 
@@ -145,7 +151,7 @@ DRAWINGS = {
     "pulse": (np.any([line(a, b, 4) for a, b in pairwise(PULSE)], axis=0), [["box"]] * 5),
     "hook": (
         line((20, 60), (60, 60), 4) | bow((60, 40), 20, 0, 90, 4) | line((80, 15), (80, 40), 4),
-        [["box"], ["box"], ["circle", "circle", "circle"]],
+        [["box"], ["box"], ["circle", "circle", "triangle"]],
     ),
     "horseshoe": (bow((60, 55), 30, 150, 240, 5), [["circle", "circle", "triangle", "circle", "circle"]]),
     "crossed out": (
@@ -155,19 +161,29 @@ DRAWINGS = {
 }
 
 
+def taken_apart(pixels):
+    """What is told by its outline, before any descent of all."""
+    height, width = pixels.shape[:2]
+    size = (width / min(height, width), height / min(height, width))
+    bare = SceneTensors([], torch.ones(4), "over", size)
+    views = [View(scaled(pixels.astype(np.float32), 56), None), view_of(pixels)]
+    return to_scene(peeled(bare, views, search_of()), width, height)
+
+
 @pytest.mark.parametrize("name", DRAWINGS)
 def test_a_drawing_of_strokes_is_a_layer_for_each(name):
     inside, kinds = DRAWINGS[name]
+    pixels = drawn(inside)
+    scene = taken_apart(pixels)
+    assert sorted([shape.kind for shape in layer.shapes] for layer in scene.layers) == kinds
+    assert off(scene, pixels)[0] > 26
+
+
+def test_a_whole_fit_of_them_is_near_at_any_size():
+    inside, kinds = DRAWINGS["crossed out"]
     scene = sdf2vec.fitted(drawn(inside)).scene
     assert sorted([shape.kind for shape in layer.shapes] for layer in scene.layers) == kinds
     for finer, least in ((FINER, 40), (FINER // 2, 36)):
         near, lighter = off(scene, drawn(inside, finer))
         assert near > least
         assert abs(lighter) < 0.001
-
-
-def test_a_translucent_bow_is_no_stroke():
-    """Strokes lie on each other, which shows where they are translucent."""
-    pixels = 1.0 - 0.5 * (1.0 - drawn(DRAWINGS["hook"][0]))
-    scene = sdf2vec.fitted(pixels).scene
-    assert off(scene, pixels)[0] > 38
