@@ -15,7 +15,9 @@ from .strokes import BLUNT, Line, Stroke
 STRAIGHT = 0.03  # sine of the angle by which sides are not parallel, or not at right angles, at most
 WITHIN = 0.97  # share of a frame that lies in the region, and of a stroke that is a part of it
 SURELY, HARDLY = 0.8, 0.25  # pixels within its edge of what a frame surely covers; of what is half covered
-STEP, SIDES = 0.5, 4  # pixels between radii that are tried; lines of a frame, at least
+MOSTLY = 0.7  # share of it that lies in the region where its corners are not round, too, which those of a frame may be
+STEPS, FINEST = 16, 0.5  # radii that are tried at first; pixels between those in the end
+SIDES = 4  # lines of a frame, at least
 
 
 @dataclass(frozen=True, eq=False)
@@ -49,9 +51,11 @@ def framed(found: Sequence[Stroke], inside: BoolArray) -> list[Stroke | Frame]:
     lines = [stroke for stroke in found if isinstance(stroke, Line)]
     frames: list[Frame] = []
     left = list(found)
-    for sharp in sorted(_rectangles(lines), key=lambda frame: -frame.length):
+    for sharp, sides in sorted(_rectangles(lines), key=lambda each: -each[0].length):
+        if not all(side in left for side in sides) or not _lies_in(sharp, inside, MOSTLY):
+            continue
         frame = _rounded(sharp, inside)
-        if _lies_in(frame, inside):
+        if _lies_in(frame, inside, WITHIN):
             parts = [stroke for stroke in left if _is_part(stroke, frame, inside)]
             if sum(isinstance(part, Line) for part in parts) >= SIDES:
                 frames.append(frame)
@@ -59,14 +63,14 @@ def framed(found: Sequence[Stroke], inside: BoolArray) -> list[Stroke | Frame]:
     return [*frames, *left]
 
 
-def _rectangles(lines: Sequence[Line]) -> Iterator[Frame]:
-    """Frames, without a radius, of which two pairs of lines may be the sides."""
+def _rectangles(lines: Sequence[Line]) -> Iterator[tuple[Frame, tuple[Line, ...]]]:
+    """Frames, without a radius, of which two pairs of lines may be the sides, and these."""
     pairs = [(one, other) for one, other in combinations(lines, 2) if _across(one, other) < STRAIGHT]
     for along, across in combinations(pairs, 2):
         if abs(_direction(along[0]) @ _direction(across[0])) < STRAIGHT:
             frame = _frame(along, across)
             if min(frame.sides) > frame.half:
-                yield frame
+                yield frame, (*along, *across)
 
 
 def _frame(along: tuple[Line, Line], across: tuple[Line, Line]) -> Frame:
@@ -83,10 +87,18 @@ def _frame(along: tuple[Line, Line], across: tuple[Line, Line]) -> Frame:
 
 
 def _rounded(frame: Frame, inside: BoolArray) -> Frame:
-    """A frame with the radius with which it differs least from a region."""
-    points = _points(np.ones_like(inside))
-    tried = [replace(frame, radius=float(radius)) for radius in np.arange(0.0, min(frame.sides), STEP)]
-    return min(tried, key=lambda each: int((each.covers(points, -HARDLY) != inside.reshape(-1)).sum()))
+    """A frame with the radius with which it differs least from a region: looked for ever more finely."""
+    points, flat = _points(np.ones_like(inside)), inside.reshape(-1)
+    most = min(frame.sides)
+    step = most / STEPS
+    tried = np.arange(0.0, most, step)
+    while True:
+        frames = [replace(frame, radius=float(radius)) for radius in tried]
+        best = min(frames, key=lambda each: int((each.covers(points, -HARDLY) != flat).sum()))
+        if step <= FINEST:
+            return best
+        step /= 4.0
+        tried = np.clip(best.radius + step * np.arange(-4, 5), 0.0, most)
 
 
 def _points(mask: BoolArray) -> Float64Array:
@@ -104,10 +116,10 @@ def _across(one: Line, other: Line) -> float:
     return abs(float(a * d - b * c))
 
 
-def _lies_in(frame: Frame, inside: BoolArray) -> bool:
-    """Whether nearly all of a frame is in a region."""
+def _lies_in(frame: Frame, inside: BoolArray, share: float) -> bool:
+    """Whether more than a share of a frame is in a region."""
     own = frame.covers(_points(np.ones_like(inside)), -SURELY)
-    return bool(own.any()) and float(inside.reshape(-1)[own].mean()) > WITHIN
+    return bool(own.any()) and float(inside.reshape(-1)[own].mean()) > share
 
 
 def _is_part(stroke: Stroke, frame: Frame, inside: BoolArray) -> bool:
