@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -156,23 +156,30 @@ class Area:
         """How well some layers cover it that lie on each other."""
         first, *more = layers
         off = float((self.cover(layers) * self.known - self.inside).abs().sum())
-        size = max(float(self.inside.sum()), TINY)
-        return Outlined(first, self.overlay, off / self.edge, off / size, False, self.soft, tuple(more))
+        return replace(self._judged(first, off, False), more=tuple(more))
 
     def all_outlined(self, layers: Sequence[Group]) -> list[Outlined]:
-        """The same of some layers of one structure."""
+        """The same of some layers of one structure, each alone."""
         wrong = (self._covers(layers) * self.known - self.inside).abs().sum(1)
-        size = max(float(self.inside.sum()), TINY)
         return [
-            Outlined(layer, self.overlay, off / self.edge, off / size, self._is_bitten(layer), self.soft)
+            self._judged(layer, off, self._is_bitten(layer))
             for layer, off in zip(layers, wrong.tolist(), strict=True)
         ]
+
+    def _judged(self, layer: Group, off: float, bitten: bool) -> Outlined:
+        """A layer that covers so many pixels wrongly."""
+        return Outlined(layer, self.overlay, off / self.edge, off / self._size, bitten, self.soft)
+
+    @property
+    def _size(self) -> float:
+        """In pixels."""
+        return max(float(self.inside.sum()), TINY)
 
     def gross(self, layers: Sequence[Group], pixels: int) -> float:
         """The share of it that layers cover wrongly in squares of so many pixels: elsewhere their edge is off."""
         wrong = self.around.plane((self.cover(layers) * self.known - self.inside).abs() > 0.5)
         squares = ndimage.binary_opening(wrong, np.ones((pixels, pixels)))
-        return float(squares.sum()) / max(float(self.inside.sum()), TINY)
+        return float(squares.sum()) / self._size
 
     def _is_bitten(self, layer: Group) -> bool:
         """Whether a shape that is cut out of the first goes beyond its edge, or one that leaves a part of it does."""

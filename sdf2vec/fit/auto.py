@@ -372,7 +372,7 @@ class Drawing:
             hope = THOROUGH if few else USUAL
             self.scene = pruned(self.scene, sizes, search, self.floor, hope)
         self.scene = simplified(self.scene, sizes.joint, search, worst)
-        self.scene = sharper(finished(self.scene, sizes, search), sizes, search)
+        self.scene = sharper(finished(self.scene, sizes, search), sizes, search, FLOOR)
         self.scene = self._briefer(self.floor)
         self.scene = sharing(lined(self.scene, sizes.last, search, worst), sizes.last, worst)
 

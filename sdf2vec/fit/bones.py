@@ -55,6 +55,11 @@ def depth_of(inside: BoolArray) -> Float64Array:
     return np.asarray(ndimage.distance_transform_edt(np.pad(inside, 1))[1:-1, 1:-1] - 0.5)
 
 
+def pixels_of(mask: BoolArray) -> Float64Array:
+    """Those (x, y) of a mask, [N, 2]."""
+    return np.stack(np.nonzero(mask)[::-1], axis=1).astype(np.float64)
+
+
 def seen(points: Float64Array, plane: Float64Array) -> Float64Array:
     """What a plane [H, W] has at points (x, y) [N, 2]; 0 off it."""
     return np.asarray(ndimage.map_coordinates(plane, points.T[::-1], order=1, cval=0.0))

@@ -28,9 +28,8 @@ AFTER = Phase("after", 40, 0, rate=0.2, end_rate=0.02)  # one layer was taken ou
 LAST = Phase("last", 150, 0, rate=0.3, end_rate=0.01)
 SOFT = 2.0  # pixels of the picture where all descend: edges that may become soft or sharp
 SOFTENED, FOUND = 0.8, 10**-3  # of the error before, and mean squared error, at most, after edges became soft
-# pixels of falloff, where a picture is seen largest, of what may be sharp; times the mean squared
-# error that it may then have, or so much: 44 dB
-NEARLY_SHARP, ABOUT, ANYWAY = 2.5, 1.5, 10**-4.4
+# pixels of falloff, where a picture is seen largest, of what may be sharp; times the error that it may then have
+NEARLY_SHARP, ABOUT = 2.5, 1.5
 
 
 class Sizes(NamedTuple):
@@ -99,22 +98,23 @@ def softer(scene: SceneTensors, view: View, search: Search) -> SceneTensors:
     return made if helps else scene
 
 
-def sharper(scene: SceneTensors, sizes: Sizes, search: Search) -> SceneTensors:
+def sharper(scene: SceneTensors, sizes: Sizes, search: Search, floor: float) -> SceneTensors:
     """The scene with all edges sharp that are nearly so, or else with some, after a descent, where it comes about as
-    near: soft ones tell what antialiasing does, which goes with the size at which they were found.
+    near, or below a mean squared error: soft ones tell what antialiasing does, which goes with the size at which they
+    were found.
     """
     least = NEARLY_SHARP / min(sizes.last.target.shape[1:])
-    limit = max(ABOUT * error_of(scene, sizes.last), ANYWAY)
-
-    def tried(scene: SceneTensors, orders: Sequence[int]) -> SceneTensors | None:
-        made = descended(_sharpened(scene, orders, least), sizes.last, search, LAST, simple=True)
-        return made if error_of(made, sizes.last) <= limit else None
-
     nearly = [
         order for order in range(scene.layer_count) if 0.0 < float(layer_at(scene, order).falloff) < least
     ]
     if not nearly:
         return scene
+    limit = max(ABOUT * error_of(scene, sizes.last), floor)
+
+    def tried(scene: SceneTensors, orders: Sequence[int]) -> SceneTensors | None:
+        made = descended(_sharpened(scene, orders, least), sizes.last, search, LAST, simple=True)
+        return made if error_of(made, sizes.last) <= limit else None
+
     if made := tried(scene, nearly):
         return made
     for order in nearly if len(nearly) <= FEW else ():

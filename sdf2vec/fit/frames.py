@@ -6,10 +6,12 @@ import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from itertools import combinations
+from typing import NamedTuple
 
 import numpy as np
 
 from ..arrays import BoolArray, Float64Array
+from .bones import pixels_of
 from .strokes import BLUNT, Line, Stroke
 
 STRAIGHT = 0.03  # sine of the angle by which sides are not parallel, or not at right angles, at most
@@ -46,17 +48,26 @@ class Frame:
         return np.asarray(np.abs(off - self.radius) <= self.half + more)
 
 
+class Region(NamedTuple):
+    """All pixels (x, y) of a plane [N, 2], and which of them are in a region [N]."""
+
+    pixels: Float64Array
+    inside: BoolArray
+
+
 def framed(found: Sequence[Stroke], inside: BoolArray) -> list[Stroke | Frame]:
     """Strokes of a region [H, W] with frames in place of those that go around rectangles."""
+    region = Region(pixels_of(np.ones_like(inside)), inside.reshape(-1))
+    own = region.pixels[region.inside]
     lines = [stroke for stroke in found if isinstance(stroke, Line)]
     frames: list[Frame] = []
     left = list(found)
     for sharp, sides in sorted(_rectangles(lines), key=lambda each: -each[0].length):
-        if not all(side in left for side in sides) or not _lies_in(sharp, inside, MOSTLY):
+        if not all(side in left for side in sides) or not _lies_in(sharp, region, MOSTLY):
             continue
-        frame = _rounded(sharp, inside)
-        if _lies_in(frame, inside, WITHIN):
-            parts = [stroke for stroke in left if _is_part(stroke, frame, inside)]
+        frame = _rounded(sharp, region)
+        if _lies_in(frame, region, WITHIN):
+            parts = [stroke for stroke in left if _is_part(stroke, frame, own)]
             if sum(isinstance(part, Line) for part in parts) >= SIDES:
                 frames.append(frame)
                 left = [stroke for stroke in left if stroke not in parts]
@@ -86,24 +97,18 @@ def _frame(along: tuple[Line, Line], across: tuple[Line, Line]) -> Frame:
     return Frame(middle, ((right - left) / 2.0, (bottom - top) / 2.0), math.atan2(x[1], x[0]), 0.0, half)
 
 
-def _rounded(frame: Frame, inside: BoolArray) -> Frame:
+def _rounded(frame: Frame, region: Region) -> Frame:
     """A frame with the radius with which it differs least from a region: looked for ever more finely."""
-    points, flat = _points(np.ones_like(inside)), inside.reshape(-1)
     most = min(frame.sides)
     step = most / STEPS
     tried = np.arange(0.0, most, step)
     while True:
         frames = [replace(frame, radius=float(radius)) for radius in tried]
-        best = min(frames, key=lambda each: int((each.covers(points, -HARDLY) != flat).sum()))
+        best = min(frames, key=lambda each: int((each.covers(region.pixels, -HARDLY) != region.inside).sum()))
         if step <= FINEST:
             return best
         step /= 4.0
         tried = np.clip(best.radius + step * np.arange(-4, 5), 0.0, most)
-
-
-def _points(mask: BoolArray) -> Float64Array:
-    """The pixels (x, y) of a mask, [N, 2]."""
-    return np.stack(np.nonzero(mask)[::-1], axis=1).astype(np.float64)
 
 
 def _direction(line: Line) -> Float64Array:
@@ -116,14 +121,13 @@ def _across(one: Line, other: Line) -> float:
     return abs(float(a * d - b * c))
 
 
-def _lies_in(frame: Frame, inside: BoolArray, share: float) -> bool:
+def _lies_in(frame: Frame, region: Region, share: float) -> bool:
     """Whether more than a share of a frame is in a region."""
-    own = frame.covers(_points(np.ones_like(inside)), -SURELY)
-    return bool(own.any()) and float(inside.reshape(-1)[own].mean()) > share
+    own = frame.covers(region.pixels, -SURELY)
+    return bool(own.any()) and float(region.inside[own].mean()) > share
 
 
-def _is_part(stroke: Stroke, frame: Frame, inside: BoolArray) -> bool:
-    """Whether nearly all that a stroke covers of a region is a frame's."""
-    points = _points(inside)
-    own = points[stroke.covers(points)]
+def _is_part(stroke: Stroke, frame: Frame, pixels: Float64Array) -> bool:
+    """Whether nearly all pixels [N, 2] that a stroke covers are a frame's."""
+    own = pixels[stroke.covers(pixels)]
     return bool(len(own)) and float(frame.covers(own).mean()) > WITHIN

@@ -11,7 +11,7 @@ import numpy as np
 
 from ..arrays import BoolArray, Float64Array
 from .arcs import circles_of, sums_of
-from .bones import CLEAR, LEAST, depth_of, middle_lines, seen
+from .bones import CLEAR, LEAST, depth_of, middle_lines, pixels_of, seen
 
 STRIDE = 2  # points between those at which a line may become a bow
 CLOSED = 1.5  # pixels between the ends of a path around
@@ -344,8 +344,7 @@ def _way(steps: Float64Array, points: Float64Array, depth: Float64Array, least: 
 
 def _needed(ranked: list[Stroke], inside: BoolArray) -> list[Stroke]:
     """Those without which some of the region would not be covered; with square ends where more is covered so."""
-    rows, columns = np.nonzero(inside)
-    points = np.stack([columns, rows], axis=1).astype(np.float64)
+    points = pixels_of(inside)
     covers = [stroke.covers(points) for stroke in ranked]
     least = [NEEDED * stroke.half**2 for stroke in ranked]
     kept: list[int] = []

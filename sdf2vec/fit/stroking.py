@@ -51,14 +51,14 @@ def _line(line: Line, area: Area) -> Group:
 
 def _frame(frame: Frame, area: Area) -> Group:
     """A layer of a box out of which another is cut."""
-    layer, place = None, area.opening()
-    for way in (1.0, -1.0):
-        more = way * frame.half
-        sides = (frame.sides[0] + more, frame.sides[1] + more)
-        layer = _with_box(frame.middle, sides, frame.angle, max(frame.radius + more, 0.0), area, place)
-        place = area.cut(layer)
-    assert layer is not None
-    return joined_sharply(layer)
+    outer = _grown_box(frame, frame.half, area, area.opening())
+    return joined_sharply(_grown_box(frame, -frame.half, area, area.cut(outer)))
+
+
+def _grown_box(frame: Frame, more: float, area: Area, place: Opening) -> Group:
+    """The layer with the box of a frame's middle line in a place, so many pixels larger on all sides."""
+    across, down = (side + more for side in frame.sides)
+    return _with_box(frame.middle, (across, down), frame.angle, max(frame.radius + more, 0.0), area, place)
 
 
 def _with_box(

@@ -6,6 +6,7 @@ import torch
 
 from sdf2vec.api import render
 from sdf2vec.fit.descents import Sizes, _sharpened, sharper
+from sdf2vec.fit.pruning import FLOOR
 from sdf2vec.render.tensors import from_scene, to_scene
 from sdf2vec.scene import Joint, Layer, Scene
 from tests.fit.drawn import BLUE, SIDE, disc, painted, search_of, sharp_disc, view_of
@@ -22,7 +23,7 @@ def soft(layer: Layer, pixels: float, smaller: float = 0.0) -> Layer:
 def after(layers: list[Layer], pixels: np.ndarray) -> tuple[Layer, ...]:
     view = view_of(pixels)
     scene = from_scene(Scene(SIDE, SIDE, tuple(layers), (1.0, 1.0, 1.0)))
-    return to_scene(sharper(scene, Sizes(view, view, view), search_of()), SIDE, SIDE).layers
+    return to_scene(sharper(scene, Sizes(view, view, view), search_of(), FLOOR), SIDE, SIDE).layers
 
 
 DISCS = [sharp_disc(BLUE, 30, 30, 20), sharp_disc(BLUE, 70, 65, 18)]
@@ -57,5 +58,5 @@ def test_sharp_scenes_and_soft_ones_are_left(monkeypatch):
     pixels = painted((disc(30, 30, 20), BLUE, 1.0))
     scene = from_scene(Scene(SIDE, SIDE, (DISCS[0], soft(DISCS[1], 4.0)), (1.0, 1.0, 1.0)))
     sizes = Sizes(*(view_of(pixels),) * 3)
-    assert sharper(scene, sizes, search_of()) is scene
+    assert sharper(scene, sizes, search_of(), FLOOR) is scene
     assert torch.equal(scene.groups[0].falloff.flatten() > 0, torch.tensor([False, True]))
