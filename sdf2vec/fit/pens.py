@@ -18,14 +18,20 @@ AS_GOOD = 1.1  # times the mean squared error, at most
 
 
 def lined(scene: SceneTensors, view: View, search: Search, worst: float) -> SceneTensors:
-    """The scene with long boxes as strokes where that is as good, in one width where theirs hardly differ."""
+    """The scene with long boxes as strokes, those with round corners where that is as good, others where it is better;
+    in one width where theirs hardly differ.
+    """
     error = error_of(scene, view)
     limit = max(worst, AS_GOOD * error, error + 4.0 * UNSEEN)
     for order in range(scene.layer_count):
         layer = layer_at(scene, order)
         if bool(_are_long(layer).any()):
-            made = inserted(scene, _rounded(layer, Surroundings.of(scene, order, view), search))
-            scene = made if error_of(made, view) <= limit else scene
+            around = Surroundings.of(scene, order, view)
+            made = inserted(scene, _rounded(layer, around, search))
+            most = limit
+            if not bool(layer.of("corner_radius", 0).any()):
+                most = error_of(inserted(scene, _moved(layer, around, search)), view) - UNSEEN
+            scene = made if error_of(made, view) <= most else scene
     made = detached(scene)
     for group in made.groups:
         in_one_width(group, group, ALIKE)
@@ -36,13 +42,18 @@ def _rounded(layer: Group, around: Surroundings, search: Search) -> Group:
     """A layer of a box with round ends, whose other numbers have moved a little."""
     made = layer.each(lambda tensor: tensor.detach().clone())
     with_round_ends(made, torch.tensor([True]))
-    still = {slot for slot, v in made.values.items() if v.numel() == 1 and is_simple(slot, float(v))}
-    corner = made.of("corner_radius", 0)
-    found = search.trained(
-        made, around, STEPS, lambda slot: slot not in still and made.values[slot] is not corner
-    ).layer
+    found = _moved(made, around, search)
     with_round_ends(found, torch.tensor([True]))
     return found
+
+
+def _moved(layer: Group, around: Surroundings, search: Search) -> Group:
+    """A layer of a box, nearer to what it should be with the corners that it has."""
+    still = {slot for slot, v in layer.values.items() if v.numel() == 1 and is_simple(slot, float(v))}
+    corner = layer.of("corner_radius", 0)
+    return search.trained(
+        layer, around, STEPS, lambda slot: slot not in still and layer.values[slot] is not corner
+    ).layer
 
 
 def strokes_of(group: Group) -> torch.Tensor:

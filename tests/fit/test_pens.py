@@ -52,6 +52,18 @@ def test_square_ends_and_unlike_widths_stay():
     assert [row[3] * SIDE for row in found] == pytest.approx([5, 5, 7], abs=0.1)
 
 
+def test_what_ends_unseen_under_others_stays_a_box():
+    ends = [disc(x, 25, 9) for x in (23, 73)]
+    pixels = painted((box(23, 20, 73, 30), BLUE, 1.0), (ends[0] | ends[1], (0.0, 0.0, 0.0), 1.0))
+    over = [
+        Layer(
+            (Shape.of("circle", (0.0, 0.0, 0.0), center=(x / SIDE - 0.5, 25 / SIDE - 0.5), radius=9 / SIDE),)
+        )
+        for x in (23, 73)
+    ]
+    assert after([bar(25, 5, 0), *over], pixels)[0][5] == 0.0
+
+
 def test_what_is_hardly_longer_than_wide_is_no_stroke():
     scene = Scene(SIDE, SIDE, (bar(25, 5, 5, length=7), bar(60, 5, 5), bar(80, 5, 3)), (1, 1, 1))
     (group,) = from_scene(scene).groups
