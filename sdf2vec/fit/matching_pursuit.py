@@ -13,8 +13,10 @@ from functools import lru_cache
 from itertools import accumulate, chain, islice, repeat
 from typing import NamedTuple
 
+import numpy as np
 import torch
 
+from ..arrays import Float32Array
 from ..banded import Band
 
 ROUNDS = 2  # the residual is looked at anew so many times, more often where not all discs find room
@@ -29,6 +31,7 @@ SPACING = 1.0 / 3.0  # of a radius, at most, between places of discs, where that
 DISC = 0.7  # amount of a disc in that of the Gaussian which fits it best: 1 / (2 − 2·exp(−u)), u = 1.256
 TINY = 1e-9
 LEAST = 1e-5  # mean squared error, below one level of 255: no reason to paint, and above what rounding makes
+BLOCK = 1024  # gains of which the largest is known
 APART = 1.5  # radii around a disc where none is put in the same round
 
 Response = tuple[
@@ -65,8 +68,8 @@ class Missing(NamedTuple):
             fitted, energy = fit.by(size.once), weigh.by(size.twice).clamp_min(TINY)
             yield fitted / energy, (fitted.square() / energy).sum(0)
 
-    def apply(self, window: torch.Tensor, color: torch.Tensor) -> None:
-        self.residual.sub_(color[:, None, None] * window)
+    def apply(self, cover: Cover, color: torch.Tensor) -> None:
+        cover.of(self.residual).sub_(color[:, None, None] * cover.amounts)
 
     def amount(self, color: torch.Tensor) -> torch.Tensor:
         """Of a disc in that of the Gaussian that stands for it."""
@@ -98,8 +101,9 @@ class Painted(NamedTuple):
             fixed = 2.0 * once[-1] + twice[-2]
             yield colors, (colors * (2.0 * linear - colors * energy)).sum(0) - fixed - LEAST * energy
 
-    def apply(self, window: torch.Tensor, color: torch.Tensor) -> None:
-        self.image.add_((color[:, None, None] - self.image) * window)
+    def apply(self, cover: Cover, color: torch.Tensor) -> None:
+        image = cover.of(self.image)
+        image.add_((color[:, None, None] - image) * cover.amounts)
 
     def amount(self, color: torch.Tensor) -> torch.Tensor:
         """Of a disc in that of the Gaussian that stands for it."""
@@ -136,21 +140,49 @@ def find_discs(canvas: Missing | Painted, count: int) -> Discs:
 def _round(canvas: Missing | Painted, sizes: Sequence[Size]) -> Iterator[Disc]:
     """The best discs, put on the canvas one after the other, until their surroundings fill it."""
     colors, own = zip(*canvas.responses(sizes), strict=True)
-    gains = torch.cat([each.flatten() for each in own])
-    grids = [
-        part.view_as(each) for part, each in zip(gains.split([e.numel() for e in own]), own, strict=True)
-    ]
-    ends = list(accumulate(grid.numel() for grid in grids))
-    while gains[best := int(gains.argmax())] > 0:
-        index = bisect_right(ends, best)
-        row, column = divmod(best - ends[index] + grids[index].numel(), grids[index].shape[1])
+    gains = Gains.of(own)
+    while (best := gains.largest()) is not None:
+        index, row, column = best
         size = sizes[index]
         x, y = size.across.place(column), size.down.place(row)
         disc = Disc(x, y, size.radius, colors[index][:, row, column].clone())
-        canvas.apply(_cover(disc, *canvas.weights.shape), disc.color)
-        for other, grid in zip(sizes, grids, strict=True):
+        canvas.apply(size.cover(y, x, *canvas.weights.shape), disc.color)
+        for other, grid in zip(sizes, gains.grids, strict=True):
             grid[other.down.near(y, size.radius), other.across.near(x, size.radius)] = -1.0
         yield disc
+
+
+class Gains(NamedTuple):
+    """What discs gain at the places of every size, in blocks; numbers only become less."""
+
+    grids: Sequence[Float32Array]  # of each size [h, w]: parts of `blocks`
+    ends: Sequence[int]  # of these parts
+    blocks: Float32Array  # [B, BLOCK]
+    most: Float32Array  # [B] no less than the largest of each block
+
+    @classmethod
+    def of(cls, own: Sequence[torch.Tensor]) -> Gains:
+        """Those of every size [h, w]."""
+        ends = list(accumulate(each.numel() for each in own))
+        rest = torch.full((-ends[-1] % BLOCK,), -1.0)
+        flat = torch.cat([*(each.flatten() for each in own), rest]).numpy()
+        parts = np.split(flat, ends)
+        grids = [part.reshape(each.shape) for part, each in zip(parts, own, strict=False)]
+        blocks = flat.reshape(-1, BLOCK)
+        return cls(grids, ends, blocks, blocks.max(axis=1))
+
+    def largest(self) -> tuple[int, int, int] | None:
+        """Which size's it is, its row and column; None where nothing gains any more."""
+        while self.most[block := int(self.most.argmax())] > 0.0:
+            own = self.blocks[block]
+            place = int(own.argmax())
+            if own[place] == self.most[block]:
+                best = block * BLOCK + place
+                index = bisect_right(self.ends, best)
+                grid = self.grids[index]
+                return index, *divmod(best - self.ends[index] + grid.size, grid.shape[1])
+            self.most[block] = own[place]
+        return None
 
 
 # --- Gaussians ----------------------------------------------------------------------------------------------
@@ -205,6 +237,7 @@ class Size(NamedTuple):
     across: Axis
     once: tuple[Band, Band]
     twice: tuple[Band, Band]
+    window: torch.Tensor  # the Gaussian where it is not cut off, [2 · reach + 1]
 
     @classmethod
     def of(cls, radius: float, height: int, width: int) -> Size:
@@ -214,7 +247,20 @@ class Size(NamedTuple):
         once, twice = (
             (down.gaussians(own), across.gaussians(own)) for own in (radius, radius / math.sqrt(2.0))
         )
-        return cls(radius, down, across, once, twice)
+        reach = math.ceil(FARTHEST * WIDTH * radius)
+        return cls(radius, down, across, once, twice, _window(torch.arange(-reach, reach + 1), radius))
+
+    def cover(self, y: int, x: int, height: int, width: int) -> Cover:
+        """That of the Gaussian that stands for a disc at a pixel, where it is not cut off."""
+        reach = len(self.window) // 2
+        rows, columns = (
+            slice(max(at - reach, 0), min(at + reach + 1, side)) for at, side in ((y, height), (x, width))
+        )
+        down, across = (
+            self.window[part.start - at + reach : part.stop - at + reach]
+            for part, at in ((rows, y), (columns, x))
+        )
+        return Cover(rows, columns, down[:, None] * across)
 
 
 class Blurring(NamedTuple):
@@ -253,9 +299,13 @@ def _window(offsets: torch.Tensor, radius: float) -> torch.Tensor:
     return torch.where(z.abs() < FARTHEST, torch.exp(-0.5 * z.square()), 0.0)
 
 
-def _cover(disc: Disc, height: int, width: int) -> torch.Tensor:
-    """How much of each pixel the Gaussian covers that stands for a disc, [H, W]."""
-    down, across = (
-        _window(torch.arange(side) - at, disc.radius) for side, at in ((height, disc.y), (width, disc.x))
-    )
-    return down[:, None] * across
+class Cover(NamedTuple):
+    """How much of each pixel of a part of the picture a disc covers."""
+
+    rows: slice
+    columns: slice
+    amounts: torch.Tensor  # [h, w]
+
+    def of(self, image: torch.Tensor) -> torch.Tensor:
+        """The part of an image [C, H, W]."""
+        return image[:, self.rows, self.columns]
