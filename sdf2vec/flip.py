@@ -251,12 +251,21 @@ class Filters:
     def __call__(self, linear: Tensor) -> Tensor:
         """[B, 3, H, W] to [B, 8, H, W]."""
         reach = self.across.shape[3] // 2
-        padded = F.pad(linear, (reach, reach, reach, reach), mode="replicate")
+        padded = _edged(_edged(linear, reach, 2), reach, 3)
         opponent = (self.to_opponent @ padded.flatten(2)).unflatten(2, padded.shape[2:])
         planes: Tensor = opponent[:, self.opponents]
         for kernels in (self.across, self.down):
             planes = F.conv2d(planes, kernels, groups=len(kernels))
         return planes
+
+
+def _edged(planes: Tensor, reach: int, axis: int) -> Tensor:
+    """With the first and the last repeated along an axis: on a GPU the derivative of torch's padding is not the same
+    each time.
+    """
+    ends = (planes.narrow(axis, at, 1) for at in (0, planes.shape[axis] - 1))
+    first, last = (end.repeat_interleave(reach, axis) for end in ends)
+    return torch.cat([first, planes, last], axis)
 
 
 @cache

@@ -281,3 +281,9 @@ def test_constants_follow_from_the_viewing_distance():
     assert filters.across.shape == (8, 1, 1, 21)
     sums = filters.across.sum(dim=(1, 2, 3)) * filters.down.sum(dim=(1, 2, 3))
     assert sums.tolist() == pytest.approx([1, 1, sums[2].item(), 1 - sums[2].item(), 0, 0, 0, 0], abs=1e-12)
+
+
+def test_beyond_its_edges_a_picture_goes_on_as_it_ends():
+    planes = torch.rand(2, 3, 4, 5, generator=torch.Generator().manual_seed(0))
+    padded = module._edged(module._edged(planes, 3, 2), 3, 3)
+    assert torch.equal(padded, torch.nn.functional.pad(planes, (3, 3, 3, 3), mode="replicate"))
