@@ -37,7 +37,7 @@ class Moving:
         zero = torch.zeros_like(tensor).detach()
         return cls(tensor.detach_().requires_grad_(), rate, zero, zero.clone(), zero.new_zeros(()))
 
-    def step(self, factor: float) -> None:
+    def step(self, factor: float | torch.Tensor) -> None:
         """One step down the tensor's derivative, if there is any."""
         if self.tensor.grad is None:
             return
@@ -79,22 +79,28 @@ class Adam:
         for moving in self.moving:
             moving.tensor.grad = None
 
+    @property
+    def grads(self) -> list[torch.Tensor]:
+        """All derivatives that are there."""
+        return [moving.tensor.grad for moving in self.moving if moving.tensor.grad is not None]
+
     @torch.no_grad()
-    def step(self, factor: float = 1.0) -> None:
-        """One step, all rates scaled by a factor."""
+    def step(self, factor: float | torch.Tensor = 1.0) -> None:
+        """One step, all rates scaled by a factor; as a tensor [] where it is to change in what is recorded."""
         for moving in self.moving:
             moving.step(factor)
 
     @torch.no_grad()
+    def products(self) -> torch.Tensor:
+        """Of all derivatives and their running means: see `Moving.products` [3]."""
+        return torch.stack([moving.products() for moving in self.moving]).sum(0)
+
     def agreement(self) -> float:
         """The cosine of the angle between the present derivative and the steps of late: near 1 where they are short.
 
         What hypergradient descent follows (Baydin et al. 2018). 0 before the first step.
         """
-        if not self.moving:
-            return 0.0
-        both, now, before = torch.stack([moving.products() for moving in self.moving]).sum(0).tolist()
-        return both / math.sqrt(now * before) if now * before > 0 else 0.0
+        return cosine(*self.products().tolist()) if self.moving else 0.0
 
     @torch.no_grad()
     def forget(self) -> None:
@@ -123,6 +129,11 @@ def _kept(memory: torch.Tensor, after: torch.Tensor, rows: torch.Tensor) -> torc
     kept = torch.zeros_like(after).detach()
     kept[: len(rows)] = memory[rows.to(memory.device)]
     return kept
+
+
+def cosine(both: float, one: float, other: float) -> float:
+    """Of the angle between two vectors, by their product and the squares of both; 0 where one is nothing."""
+    return both / math.sqrt(one * other) if one * other > 0 else 0.0
 
 
 def rate_of(unit: Unit, canvas: float, crowd: float) -> float:

@@ -15,20 +15,24 @@ from ..errors import Sdf2vecError
 from ..render import culled, fused
 from ..render.tensors import SceneTensors, from_scene
 from ..scene import Layer, Scene, Shape
+from .adam import Adam
 from .losses import LossMaker
+from .steps import Composite, Plain, Steps, Value
 
-Composite = Callable[[SceneTensors, int, int, int], torch.Tensor]
+StepsMaker = Callable[[Value, Composite, Adam, Callable[[], None]], Steps]
 
 
 @dataclass(frozen=True)
 class Backend:
     """`device` is torch's name; `composite` renders premultiplied RGB(A), [channels, height, width]; `losses` take the
-    place of those of their names in `losses.LOSSES`; `is_compiled`: whether kernels for a scene are there."""
+    place of those of their names in `losses.LOSSES`; `is_compiled`: whether kernels for a scene are there; `steps`:
+    how the steps of a fit are taken."""
 
     device: str
     composite: Composite
     losses: Mapping[str, LossMaker] = field(default_factory=dict)
     is_compiled: Callable[[SceneTensors, int], bool] = lambda tensors, channels: True
+    steps: StepsMaker = Plain
 
 
 composite_triton: Composite = deferred("sdf2vec.render.triton_fused", "composite")
@@ -44,7 +48,7 @@ CPU = Backend(
     },
     fused.is_compiled,
 )
-CUDA = Backend("cuda", composite_triton)
+CUDA = Backend("cuda", composite_triton, steps=deferred("sdf2vec.fit.recorded", "recorded"))
 CUDA_BY_TORCH = Backend("cuda", culled.composite)
 MPS = Backend("mps", culled.composite)
 

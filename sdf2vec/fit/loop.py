@@ -32,6 +32,7 @@ from .pilots import pilot_preset, pilot_settings, shares_of
 from .presets import MSE, Phase, Preset
 from .settings import Settings, preset_of
 from .steady import Steady, small_loss
+from .steps import Composite, Steps
 from .surroundings import View
 from .views import scaled, view_of
 
@@ -128,6 +129,7 @@ class Fit:
     def _begin(self) -> None:
         self.tensors = on_device(self._start(), self.backend.device)
         self.optimizer, self.steady = self._adam(), Steady()
+        self.taken: Steps | None = None  # how steps are, as long as the layers are the same
 
     @property
     def phases(self) -> tuple[Phase, ...]:
@@ -298,7 +300,7 @@ class Fit:
     def _take_steps(
         self, stage: Stage, moves: Callable[[Group], torch.Tensor] | None, best: Best | None
     ) -> None:
-        phase = stage.phase
+        phase, self.taken = stage.phase, None
         for step, rate in enumerate(phase.rates()):
             if phase.growth is not None and self.settings.start is None:
                 self._grow(stage, phase.growth.count(step, phase.steps, self.wanted))
@@ -315,28 +317,30 @@ class Fit:
         moves: Callable[[Group], torch.Tensor] | None,
         best: Best | None,
     ) -> float:
-        self.optimizer.zero_grad()
-        value = self._value(stage)
-        loss = float(value.detach())
+        taken = self.taken = self.taken or self._steps(stage)
+        loss = taken.slope()
         if not self.steady.holds(loss, self.tensors, self.optimizer):
             return self.steady.loss
         if best:
             best.see(loss)
-        value.backward()
-        self.steady.drop_what_is_not_finite(self.optimizer)
+        self.steady.dropped += taken.drop_what_is_not_finite()
         if moves is not None:
             _freeze(self.tensors, moves)
         if not stage.phase.slows:
-            self.steady.lengthen(self.optimizer, rate)
-        self.optimizer.step(rate * self.steady.factor)
-        project(self.tensors, self.pixel, self.preset.falloff)
+            self.steady.lengthen(taken.agreement(), rate)
+        taken.move(rate * self.steady.factor)
         if self.done % THICKEN_EVERY == 0:
             enforce_min_thickness(self.tensors, self.pixel)
         return loss
 
-    def _value(self, stage: Stage) -> torch.Tensor:
+    def _steps(self, stage: Stage) -> Steps:
+        keep = partial(project, self.tensors, self.pixel, self.preset.falloff)
+        return self.backend.steps(partial(self._value, stage), self.backend.composite, self.optimizer, keep)
+
+    def _value(self, stage: Stage, composite: Composite) -> torch.Tensor:
         """What is descended."""
-        value = stage.measure(self._draw(self.tensors, stage.target))
+        channels, height, width = stage.target.shape
+        value = stage.measure(composite(self.tensors, width, height, channels))
         if self.preset.least_area > 0:
             least_area = self.preset.least_area * self.size[0] * self.size[1]
             value = value + AREA_WEIGHT * too_small(self.tensors, least_area)
@@ -344,7 +348,7 @@ class Fit:
 
     @torch.no_grad()
     def _loss(self, stage: Stage) -> float:
-        return float(self._value(stage))
+        return float(self._value(stage, self.backend.composite))
 
     def _settle(self, stage: Stage) -> None:
         """Before the layers change, or at an end: back to what was good, unless it still is."""
@@ -437,6 +441,7 @@ class Fit:
         layers = self.layers
         fresh = densify(image, stage.target, count, self.tensors, layers, self.generator, stage.weights)
         relocate(self.tensors, self.optimizer, scores, fresh)
+        self.taken = None
 
     def _grow(self, stage: Stage, count: int) -> None:
         """New layers up to this number, and all rates for that."""
@@ -454,7 +459,7 @@ class Fit:
                 self.generator,
                 stage.weights,
             )
-            self.optimizer = self._adam().remembers(self.optimizer)
+            self.optimizer, self.taken = self._adam().remembers(self.optimizer), None
 
     @property
     def _replaceable(self) -> int:

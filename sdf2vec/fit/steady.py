@@ -78,22 +78,15 @@ class Steady:
         self.rate *= SLOWER
         self.taken_back += 1
 
-    def lengthen(self, optimizer: Adam, rate: float) -> None:
-        """Longer steps, where the slope hardly turns from one to the next; up to those at the units' own rates.
+    def lengthen(self, agreement: float, rate: float) -> None:
+        """Longer steps, where the slope hardly turns from one to the next (`Adam.agreement`); up to those at the units'
+        own rates.
 
         Beyond them shapes vanish before they find what they are for: of letters, whose slopes agree at any rate.
         """
-        self.agreement += LATELY * (optimizer.agreement() - self.agreement)
+        self.agreement += LATELY * (agreement - self.agreement)
         if self.agreement > AGREES and self.stride * rate < 1.0:
             self.stride = min(self.longest, self.stride * LONGER)
-
-    def drop_what_is_not_finite(self, optimizer: Adam) -> None:
-        """Derivatives that are no numbers move nothing."""
-        for moving in optimizer.moving:
-            grad = moving.tensor.grad
-            if grad is not None and not math.isfinite(float(grad.sum())):
-                grad.nan_to_num_(0.0, 0.0, 0.0)
-                self.dropped += 1
 
     def say(self) -> None:
         """A warning, where much had to be done."""

@@ -29,12 +29,14 @@ def compile_torch(outputs: Sequence[Expr], inputs: Sequence[Expr]) -> Callable[.
 def source(scalars: Sequence[Expr], inputs: Sequence[Expr]) -> str:
     """The text of the Python function."""
     like = str(inputs[0].payload)
-    return function_text(scalars, inputs, partial(_spell, like), f"{like}.new_tensor({{}})".format)
+    return function_text(scalars, inputs, partial(_spell, like), f"{like}.new_full((), {{}})".format)
 
 
 def _spell(like: str, node: Expr, args: list[str]) -> str:
     text = OPERATIONS[node.op].torch
     assert text is not None, f"{node.op} must be scalarized first"
     if node.op == "select" and node.args[1].op == node.args[2].op == "const":
-        args[1] = f"{like}.new_tensor({args[1]})"  # two bare numbers would come out in torch's default dtype
+        args[1] = (
+            f"{like}.new_full((), {args[1]})"  # two bare numbers would come out in torch's default dtype
+        )
     return text.format(*args)

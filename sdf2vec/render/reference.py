@@ -83,13 +83,14 @@ def canvas_axes(
 
     The canvas has width × height pixels; the axes may go on beyond its edges.
     """
-    return _axes(tensors.size, columns, rows, width, height)
+    return axes_of(tensors.size, columns, rows, width, height)
 
 
 @lru_cache(maxsize=8)
-def _axes(
+def axes_of(
     size: tuple[float, float], columns: int, rows: int, width: int, height: int
 ) -> tuple[np.ndarray, np.ndarray, np.float32]:
+    """The same of a canvas of this size in scene units."""
     sizes = [torch.tensor(value, dtype=torch.float64) for value in (width, height, *size)]
     places = torch.arange(max(columns, rows), dtype=torch.float64) + 0.5
     x, y, pixel = _canvas()(places, places, *sizes)

@@ -8,6 +8,7 @@ one tile. Equal input gives equal output, bit by bit: no sum depends on the orde
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import lru_cache
 from itertools import pairwise
 from types import ModuleType
 from typing import Any
@@ -19,7 +20,7 @@ from ..blend import COMPOSITING
 from ..layer import ROW_OPACITY
 from . import triton_kernels
 from .fused import rows_of, structures_of
-from .reference import canvas_axes
+from .reference import axes_of
 from .tensors import SceneTensors
 from .tiling import PIXELS, TILE
 
@@ -27,7 +28,19 @@ SCRATCH = 1 << 29  # bytes
 WARPS = 4  # of 32 threads, for the 256 pixels of a tile; with fewer, unions run out of registers
 
 
-def composite(tensors: SceneTensors, width: int, height: int, channels: int = 4) -> torch.Tensor:
+@dataclass
+class Room:
+    """For how many pairs of a tile and a layer a render takes memory, so that it need not wait for the GPU to know; the
+    render sets `needed` [], how many there are: where they are more, it is wrong. Without `pairs` it waits.
+    """
+
+    pairs: int | None = None
+    needed: torch.Tensor | None = None
+
+
+def composite(
+    tensors: SceneTensors, width: int, height: int, channels: int = 4, room: Room | None = None
+) -> torch.Tensor:
     """Premultiplied RGBA (or RGB, for 3 channels) before clamping, [channels, height, width], float32.
 
     Differentiable in every tensor of the scene. All of these are on one GPU, or on the CPU where Triton's
@@ -36,7 +49,7 @@ def composite(tensors: SceneTensors, width: int, height: int, channels: int = 4)
     background = tensors.background.float()
     if not tensors.layer_count:
         return background[:channels, None, None].expand(channels, height, width)
-    canvas = _canvas(tensors, width, height, channels)
+    canvas = _canvas(tensors, width, height, channels, room or Room())
     rows = rows_of(tensors.groups, canvas.pixel).float()
     image: torch.Tensor = _Composite.apply(canvas, rows.contiguous(), background.contiguous())
     return image
@@ -57,6 +70,7 @@ class _Canvas:
     pixel: float  # scene units
     hides: bool  # an opaque layer hides what is below it
     group_count: int
+    room: Room
 
     @property
     def columns(self) -> int:
@@ -67,9 +81,8 @@ class _Canvas:
         return len(self.y) // TILE
 
 
-def _canvas(tensors: SceneTensors, width: int, height: int, channels: int) -> _Canvas:
-    device = tensors.background.device
-    x, y, pixel = canvas_axes(tensors, -(-width // TILE) * TILE, -(-height // TILE) * TILE, width, height)
+def _canvas(tensors: SceneTensors, width: int, height: int, channels: int, room: Room) -> _Canvas:
+    x, y, pixel = _axes(tensors.size, width, height, tensors.background.device)
     orders = [group.order for group in tensors.groups]
     return _Canvas(
         module=triton_kernels.load(structures_of(tensors), tensors.compositing, channels),
@@ -78,12 +91,22 @@ def _canvas(tensors: SceneTensors, width: int, height: int, channels: int) -> _C
         channels=channels,
         width=width,
         height=height,
-        x=torch.from_numpy(x).to(device),
-        y=torch.from_numpy(y).to(device),
-        pixel=float(pixel),
+        x=x,
+        y=y,
+        pixel=pixel,
         hides=COMPOSITING[tensors.compositing].hides,
         group_count=len(orders),
+        room=room,
     )
+
+
+@lru_cache(maxsize=8)
+def _axes(
+    size: tuple[float, float], width: int, height: int, device: torch.device
+) -> tuple[torch.Tensor, torch.Tensor, float]:
+    """The pixel centres along both axes, padded to whole tiles, and the size of a pixel."""
+    x, y, pixel = axes_of(size, -(-width // TILE) * TILE, -(-height // TILE) * TILE, width, height)
+    return torch.from_numpy(x).to(device), torch.from_numpy(y).to(device), float(pixel)
 
 
 # --- which layers touch each tile ---------------------------------------------------------------------------
@@ -107,21 +130,23 @@ class _Bins:
 
 
 def _bin(canvas: _Canvas, rows: torch.Tensor) -> _Bins:
-    """Waits for the GPU once: to know how many pairs there may be."""
-    count, device = len(rows), rows.device
+    """Waits for the GPU once, unless there is room for so many pairs: to know how many there may be."""
+    count, device, tiles = len(rows), rows.device, canvas.columns * canvas.lines
     limits = rows.new_empty(count, 2)
     ranges = torch.empty(count, 4, dtype=torch.int32, device=device)
     place = (canvas.x, canvas.y, canvas.pixel, canvas.columns, canvas.lines, limits, ranges)
     _launch(canvas.module.measure_layers, count, canvas.groups, rows, *place)
     layer_starts = torch.nn.functional.pad(ranges[:, 3].cumsum(0), (1, 0))
-    most = int(layer_starts[-1])
-    keys = torch.empty(most, dtype=torch.int64, device=device)
-    layers, full = (torch.empty(most, dtype=torch.int32, device=device) for _ in range(2))
-    pairs = (layer_starts[1:], keys, layers, full)
+    canvas.room.needed = layer_starts[-1]
+    most = int(layer_starts[-1]) if canvas.room.pairs is None else canvas.room.pairs
+    keys = torch.full((most,), tiles * count, dtype=torch.int64, device=device)  # in no tile
+    layers, full = (torch.zeros(most, dtype=torch.int32, device=device) for _ in range(2))
+    pairs = (layer_starts[1:], keys, layers, full, most)
     _launch(canvas.module.find_pairs, count, canvas.groups, rows, canvas.order, *place, *pairs)
+    layer_starts = layer_starts.clamp(max=most)
     keys, by_tile = keys.sort()
     layers, solid = layers[by_tile], full[by_tile].bool()
-    starts = torch.searchsorted(keys, torch.arange(canvas.columns * canvas.lines + 1, device=device) * count)
+    starts = torch.searchsorted(keys, torch.arange(tiles + 1, device=device) * count)
     visible = _visible(starts, solid & (rows[layers, ROW_OPACITY] == 1.0)) if canvas.hides else starts[:-1]
     kinds = canvas.groups[layers] + solid * canvas.group_count
     return _Bins(*(part.int() for part in (starts, visible, layers, kinds, by_tile, layer_starts)))

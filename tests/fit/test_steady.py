@@ -11,7 +11,7 @@ import sdf2vec
 from sdf2vec import Layer, Scene, Shape
 from sdf2vec.errors import Sdf2vecWarning
 from sdf2vec.fit import loop
-from sdf2vec.fit.adam import Adam, adam_over
+from sdf2vec.fit.adam import adam_over
 from sdf2vec.fit.presets import PRESETS
 from sdf2vec.fit.steady import KEEP_EVERY, LONGER, LONGEST, RUNS_AWAY, SLOWER, Steady
 from sdf2vec.quality import psnr_of
@@ -91,8 +91,8 @@ def test_derivatives_that_are_no_numbers_move_nothing(monkeypatch):
     """Every tenth step one is not finite."""
     value = loop.Fit._value
 
-    def broken(fit, stage):
-        loss = value(fit, stage)
+    def broken(fit, stage, composite):
+        loss = value(fit, stage, composite)
         if loss.requires_grad and fit.done % 10 == 3:
             radius = fit.tensors.groups[0].of("radius", 0)
             loss = loss + torch.sqrt((radius[0] * 0.0).sum())  # 0, with a derivative of 0 · ∞
@@ -133,26 +133,23 @@ def test_agreement_is_the_cosine_between_slope_and_steps():
 
 
 def test_steps_get_longer_while_the_slope_does_not_turn():
-    steady, _, adam = watched()
-    agrees = iter([0.0] * 5 + [1.0] * 100)
-    adam.agreement = lambda: next(agrees)
+    steady, _, _ = watched()
     for _ in range(5):
-        steady.lengthen(adam, 0.05)
+        steady.lengthen(0.0, 0.05)
     assert steady.factor == 1.0
-    steady.lengthen(adam, 0.05)  # 0.1, lately
+    steady.lengthen(1.0, 0.05)  # 0.1, lately
     assert steady.factor == 1.0
-    steady.lengthen(adam, 0.05)
+    steady.lengthen(1.0, 0.05)
     assert steady.factor == pytest.approx(LONGER)
     for _ in range(98):
-        steady.lengthen(adam, 0.05)
+        steady.lengthen(1.0, 0.05)
     assert steady.factor == LONGEST
 
 
 def test_steps_get_no_longer_than_at_the_units_own_rates():
-    steady, _, adam = watched()
-    adam.agreement = lambda: 1.0
+    steady, _, _ = watched()
     for _ in range(100):
-        steady.lengthen(adam, 0.5)
+        steady.lengthen(1.0, 0.5)
     assert steady.factor == pytest.approx(2.0, rel=LONGER - 1.0)
 
 
@@ -169,8 +166,8 @@ def test_default_rates_stay(monkeypatch, count):
     strides = []
     lengthen = Steady.lengthen
 
-    def noted(steady: Steady, optimizer: Adam, rate: float) -> None:
-        lengthen(steady, optimizer, rate)
+    def noted(steady: Steady, agreement: float, rate: float) -> None:
+        lengthen(steady, agreement, rate)
         strides.append(steady.stride)
 
     monkeypatch.setattr(Steady, "lengthen", noted)

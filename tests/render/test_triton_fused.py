@@ -3,6 +3,7 @@
 import os
 import subprocess
 import sys
+from functools import partial
 from itertools import pairwise
 from pathlib import Path
 
@@ -96,6 +97,27 @@ def test_equal_input_gives_equal_output_also_in_chunks_of_tiles(monkeypatch):
         assert all(torch.equal(a, b) for a, b in zip(results[0], other, strict=True))
 
 
+def test_room_for_more_pairs_than_there_are_changes_nothing():
+    scene = scene_of("plain", layers=6, seed=6)
+    room = triton_fused.Room(1000)
+    renders = [partial(triton_fused.composite, room=given) for given in (None, room)]
+    one, other = (outcome(render, from_scene(scene, device=DEVICE), (40, 30)) for render in renders)
+    assert torch.equal(one[0], other[0])
+    assert all(torch.equal(a, b) for (_, a), (_, b) in zip(one[1], other[1], strict=True))
+    assert room.needed is not None
+    assert 6 <= int(room.needed) < 1000
+
+
+def test_room_for_fewer_pairs_than_there_are_is_kept_and_said():
+    scene = scene_of("plain", layers=6, seed=6)
+    rooms = [triton_fused.Room(pairs) for pairs in (1000, 3, 0)]
+    for room in rooms:
+        outcome(partial(triton_fused.composite, room=room), from_scene(scene, device=DEVICE), (40, 30))
+    needed = [room.needed for room in rooms if room.needed is not None]
+    assert needed[0] > 3
+    assert needed == [needed[0]] * 3
+
+
 @pytest.mark.parametrize(
     ("starts", "most", "chunks"),
     [
@@ -160,7 +182,7 @@ from sdf2vec.render import triton_kernels
 from sdf2vec.layer import Part
 
 POINTERS = "starts visible layers kinds places layer_starts ranges full".split()
-NUMBERS = "width height columns lines first_tile".split()
+NUMBERS = "width height columns lines first_tile most".split()
 LONG = "groups order ends keys".split()
 
 

@@ -1,0 +1,157 @@
+"""Steps on a GPU as CUDA graphs: recorded once, then launched as a whole. Else launching hundreds of small kernels, one
+after the other, takes many times as long as they do.
+"""
+
+from __future__ import annotations
+
+import warnings
+from collections.abc import Callable
+from functools import cache, partial
+from typing import Any, NamedTuple
+
+import torch
+
+from ..render.triton_fused import Room, composite
+from .adam import Adam, cosine
+from .steps import Composite, Plain, Steps, Value
+
+ROOMY, SPARE = (
+    1.5,
+    1024,
+)  # times the pairs of a tile and a layer that there are, and so many more: they change
+
+
+class Said(NamedTuple):
+    """What a step's derivatives say, all of which the CPU waits for at once."""
+
+    value: float
+    pairs: float
+    lost: float
+    both: float
+    now: float
+    before: float
+
+
+class Recorded:
+    """Steps as two graphs, of derivatives and of Adam; recorded anew where more tiles are touched than there is room
+    for. The scene, the optimizer and their tensors are those of the beginning.
+    """
+
+    derivatives: Any  # torch.cuda.CUDAGraph
+    adam: Any
+    read: Said
+    most: int  # pairs that there is room for
+
+    def __init__(self, value: Value, optimizer: Adam, keep: Callable[[], None]) -> None:
+        self.value, self.optimizer, self.keep = value, optimizer, keep
+        self.factor = optimizer.moving[0].tensor.new_ones(())
+        self.said = torch.zeros(len(Said._fields), dtype=torch.float64, device=self.factor.device)
+        self.room = Room()
+        self._aside(self._derive)  # once as usual: all kernels are compiled
+        self._record()
+
+    def slope(self) -> float:
+        self.derivatives.replay()
+        self.read = Said(*self.said.tolist())
+        if self.read.pairs > self.most:
+            self._record()
+            return self.slope()
+        return self.read.value
+
+    def drop_what_is_not_finite(self) -> int:
+        return int(self.read.lost)
+
+    def agreement(self) -> float:
+        return cosine(self.read.both, self.read.now, self.read.before)
+
+    def move(self, factor: float) -> None:
+        self.factor.fill_(factor)
+        self.adam.replay()
+
+    def _record(self) -> None:
+        """For about as many pairs as there are now."""
+        self.read = Said(*self.said.tolist())
+        self.most = round(ROOMY * self.read.pairs) + SPARE
+        self.room = Room(self.most)
+        self.derivatives = self._graph_of(self._derive)
+        self.adam = self._graph_of(self._move)
+
+    def _derive(self) -> None:
+        """All derivatives, those that are no numbers 0, and what they say."""
+        self.optimizer.zero_grad()
+        value = self.value(partial(composite, room=self.room))
+        value.backward()
+        pairs = self.room.needed
+        lost = value.new_zeros(())
+        for grad in self.optimizer.grads:
+            lost += ~grad.sum().isfinite()
+            grad.nan_to_num_(0.0, 0.0, 0.0)
+        told = [value.detach(), value.new_zeros(()) if pairs is None else pairs, lost]
+        self.said.copy_(torch.cat([torch.stack([each.double() for each in told]), self.optimizer.products()]))
+
+    def _move(self) -> None:
+        self.optimizer.step(self.factor)
+        self.keep()
+
+    def _graph_of(self, work: Callable[[], None]) -> Any:
+        return _graph_of(work)
+
+    def _aside(self, work: Callable[[], None]) -> None:
+        _aside(work)
+
+
+def recorded(value: Value, composite: Composite, optimizer: Adam, keep: Callable[[], None]) -> Steps:
+    """Recorded steps; others where something in them can't be recorded, which is said."""
+    try:
+        return Recorded(value, optimizer, keep)
+    except RuntimeError as error:
+        reason = str(error).strip().partition("\n")[0]
+        warnings.warn(
+            f"the steps of a fit can't be recorded here, and take longer ({reason})",
+            RuntimeWarning,
+            stacklevel=2,
+        )
+        return Plain(value, composite, optimizer, keep)
+
+
+# --- CUDA ---------------------------------------------------------------------------------------------------
+
+
+def _graph_of(work: Callable[[], object], pool: Any = None) -> Any:
+    graph = torch.cuda.CUDAGraph()
+
+    def recorded() -> None:
+        graph.capture_begin(pool=pool or _pool())
+        try:
+            work()
+        finally:
+            graph.capture_end()
+
+    _aside(recorded)
+    return graph
+
+
+def _aside(work: Callable[[], None]) -> None:
+    """Does it on a stream of its own, where alone it may be recorded."""
+    stream, usual = _stream(), torch.cuda.current_stream()
+    stream.wait_stream(usual)
+    with torch.cuda.stream(stream):
+        work()
+    usual.wait_stream(stream)
+
+
+@cache
+def _stream() -> Any:
+    return torch.cuda.Stream()
+
+
+@cache
+def _pool() -> Any:
+    """The memory of what is recorded, kept for what is recorded next."""
+    return _keeper().pool()
+
+
+@cache
+def _keeper() -> Any:
+    """A graph whose memory is kept because it is."""
+    return _graph_of(lambda: torch.zeros(1, device="cuda"), torch.cuda.graph_pool_handle())

@@ -1,0 +1,118 @@
+"""Steps that are recorded: as CUDA graphs on a GPU; without one, what would be recorded is done anew each time."""
+
+from functools import partial
+from types import SimpleNamespace
+
+import pytest
+import torch
+
+from sdf2vec import Layer, Scene, Shape
+from sdf2vec.fit import recorded
+from sdf2vec.fit.adam import adam_over
+from sdf2vec.fit.constraints import project
+from sdf2vec.fit.recorded import Recorded
+from sdf2vec.fit.steps import Plain
+from sdf2vec.render.tensors import from_scene
+from sdf2vec.render.triton_fused import composite
+from tests.triton_device import DEVICE
+
+WIDTH, HEIGHT = 80, 64
+pytestmark = [
+    pytest.mark.filterwarnings("ignore::RuntimeWarning:triton"),  # the interpreter's 0.5 / 0, not selected
+    pytest.mark.usefixtures("triton"),
+]
+
+
+@pytest.fixture
+def triton(require_engine):
+    require_engine("triton")
+
+
+class Repeated(Recorded):
+    """Does what would be recorded."""
+
+    def _graph_of(self, work):
+        return SimpleNamespace(replay=work)
+
+    def _aside(self, work):
+        work()
+
+
+def circle(x, radius, color):
+    return Layer((Shape.of("circle", color, center=(x, 0.0), radius=radius),), 0.05, 0.8)
+
+
+def begun(make, radius=0.1, spoilt=False):
+    """Steps of two discs that ought to be one large one, and the scene."""
+    layers = (circle(-0.2, radius, (0.9, 0.2, 0.1)), circle(0.2, radius, (0.1, 0.5, 0.9)))
+    scene = from_scene(Scene(WIDTH, HEIGHT, layers, (0.5, 0.5, 0.5)), device=DEVICE)
+    optimizer = adam_over(scene)
+    wanted = Scene(WIDTH, HEIGHT, (circle(0.0, 0.5, (0.2, 0.8, 0.3)),), (0.1, 0.1, 0.1))
+    target = composite(from_scene(wanted, device=DEVICE), WIDTH, HEIGHT, 3)
+
+    def value(renderer):
+        error = (renderer(scene, WIDTH, HEIGHT, 3) - target).square().mean()
+        if spoilt:
+            error = error + torch.sqrt((scene.groups[0].of("radius", 0) * 0.0).sum())
+        return error
+
+    keep = partial(project, scene, 1.0 / HEIGHT)
+    given = (value, composite, optimizer, keep) if make is Plain else (value, optimizer, keep)
+    return make(*given), scene
+
+
+def recording():
+    return Recorded if DEVICE == "cuda" else Repeated
+
+
+def numbers(scene):
+    return torch.cat([scene.groups[0].rows().flatten(), scene.background]).detach()
+
+
+def test_recorded_steps_are_those_of_torch():
+    (plain, ours), (made, theirs) = begun(Plain), begun(recording())
+    for factor in (1.0, 0.5, 2.0, 0.1):
+        assert made.slope() == pytest.approx(plain.slope(), rel=1e-5)
+        assert made.drop_what_is_not_finite() == plain.drop_what_is_not_finite() == 0
+        assert made.agreement() == pytest.approx(plain.agreement(), abs=1e-4)
+        for steps in (plain, made):
+            steps.move(factor)
+        assert torch.allclose(numbers(ours), numbers(theirs), atol=1e-5)
+    assert plain.agreement() > 0.1
+
+
+def test_shapes_that_grow_beyond_the_room_are_recorded_anew(monkeypatch):
+    monkeypatch.setattr(recorded, "ROOMY", 1.0)
+    monkeypatch.setattr(recorded, "SPARE", 0)
+    made, scene = begun(recording())
+    before = made.most
+    with torch.no_grad():
+        scene.groups[0].of("radius", 0).fill_(0.6)
+    plain, _ = begun(Plain, radius=0.6)
+    assert made.slope() == pytest.approx(plain.slope(), rel=1e-5)
+    assert made.most > before
+    for moving, other in zip(made.optimizer.moving, plain.optimizer.moving, strict=True):
+        assert torch.allclose(moving.tensor.grad, other.tensor.grad, rtol=1e-4, atol=1e-7)
+
+
+def test_derivatives_that_are_no_numbers_are_counted_and_move_nothing():
+    (plain, _), (made, scene) = begun(Plain, spoilt=True), begun(recording(), spoilt=True)
+    for steps in (plain, made):
+        steps.slope()
+        assert steps.drop_what_is_not_finite() == 1
+        steps.move(1.0)
+    assert numbers(scene).isfinite().all()
+    assert scene.groups[0].of("radius", 0).flatten().tolist() == pytest.approx([0.1, 0.1])
+
+
+@pytest.mark.skipif(DEVICE != "cuda", reason="needs an NVIDIA GPU")
+def test_what_cannot_be_recorded_is_done_by_torch():
+    def value(renderer):
+        error = scene.background.square().sum()
+        return error * float(error.detach())  # waits for the GPU
+
+    scene = from_scene(Scene(8, 8, (), (0.5, 0.5, 0.5)), device=DEVICE)
+    with pytest.warns(RuntimeWarning, match="can't be recorded"):
+        steps = recorded.recorded(value, composite, adam_over(scene), lambda: None)
+    assert isinstance(steps, Plain)
+    assert steps.slope() == pytest.approx(0.75**2 + 2 * 0.75 + 1.0)
