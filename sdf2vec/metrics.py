@@ -6,6 +6,8 @@ FLIP, which is longer, is in `flip`.
 
 from __future__ import annotations
 
+from functools import lru_cache
+
 import torch
 import torch.nn.functional as F  # noqa: N812
 from torch import Tensor
@@ -64,10 +66,15 @@ def comparable(a: Tensor, b: Tensor) -> tuple[Tensor, Tensor]:
 def _local_means(stack: Tensor, window: int) -> Tensor:
     """Gaussian-weighted means of [N, C, H, W] over every window that lies inside."""
     n, c, height, width = stack.shape
-    down, across = (gaussian_window(side, window).to(stack) for side in (height, width))
+    down, across = (_window_on(stack.device, stack.dtype, side, window) for side in (height, width))
     planes = stack.reshape(n * c, 1, height, width)
     means = F.conv2d(F.conv2d(planes, down.view(1, 1, -1, 1)), across.view(1, 1, 1, -1))
     return means.view(n, c, *means.shape[2:])
+
+
+@lru_cache(maxsize=16)
+def _window_on(device: torch.device, dtype: torch.dtype, side: int, window: int) -> Tensor:
+    return gaussian_window(side, window).to(device, dtype)
 
 
 def gaussian_window(side: int, window: int = 11) -> Tensor:
