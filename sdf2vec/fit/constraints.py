@@ -6,9 +6,13 @@ import math
 from collections.abc import Callable
 from functools import cache
 
+import numpy as np
 import torch
 
+from ..arrays import Float64Array
 from ..blend import COMPOSITING
+from ..graph import gradient, scalarize
+from ..lower.numpy import Arrays, compile_numpy
 from ..lower.torch import Tensors, compile_torch
 from ..render.tensors import Group, SceneTensors
 from ..shapes import KINDS
@@ -45,30 +49,30 @@ def project_group(group: Group, room: Room) -> None:
             group.of(name, index).clamp_(max=ALMOST * group.of(other, index).amin(1, keepdim=True))
 
 
+@torch.no_grad()
 def enforce_min_thickness(tensors: SceneTensors, least: float) -> None:
     """Makes shapes thinner than `least` (scene units) that thick, in place, by the shortest way."""
     for group in tensors.groups:
-        for part in range(len(group.structure)):
-            for _ in range(NEWTON_STEPS):
-                if not _thicken(group, part, least):
-                    break
+        for index, part in enumerate(group.structure):
+            columns = group.shape(index)
+            numbers = torch.stack(columns).cpu().numpy().astype(np.float64)
+            if _thicken(part.kind, numbers, least):
+                for column, moved in zip(columns, torch.from_numpy(numbers), strict=True):
+                    column.copy_(moved)
 
 
-def _thicken(group: Group, part: int, least: float) -> bool:
-    """A Newton step along the gradient of the thickness; whether there was need."""
-    columns = [column.detach().clone().requires_grad_() for column in group.shape(part)]
-    with torch.enable_grad():
-        (thickness,) = _measures(group.structure[part].kind)(*columns)[1:]
+def _thicken(kind: str, numbers: Float64Array, least: float) -> bool:
+    """Newton steps of shapes [K, G] along the gradient of their thickness, in place; whether there was need."""
+    for step in range(NEWTON_STEPS):
+        thickness, *slopes = np.broadcast_arrays(*_thickness(kind)(*numbers))
         thin = thickness < least
-        if not bool(thin.any()):
-            return False
-        grads = torch.autograd.grad(thickness.sum(), columns, allow_unused=True, materialize_grads=True)
-    slope = torch.stack(grads).square().sum(0)
-    step = (ENOUGH * least - thickness).detach() / slope.clamp(min=FLAT)
-    for index, (values, grad) in enumerate(zip(group.shape(part), grads, strict=True)):
-        away = least * math.cos(GOLDEN * index)  # a point may grow in any way
-        move = torch.where(slope < FLAT, away, grad * step)
-        values.detach().add_(torch.where(thin, move, 0.0))
+        if not thin.any():
+            return step > 0
+        slope = np.square(slopes).sum(0)
+        reach = (ENOUGH * least - thickness) / np.maximum(slope, FLAT)
+        for index, grad in enumerate(slopes):
+            away = least * math.cos(GOLDEN * index)  # a point may grow in any way
+            numbers[index] += np.where(thin, np.where(slope < FLAT, away, grad * reach), 0.0)
     return True
 
 
@@ -90,6 +94,14 @@ def thicknesses_of(tensors: SceneTensors) -> list[torch.Tensor]:
         for group in tensors.groups
         for index, part in enumerate(group.structure)
     ]
+
+
+@cache
+def _thickness(kind: str) -> Callable[..., Arrays]:
+    """The thickness of shapes and its derivatives by each of their numbers."""
+    own, scalars = KINDS[kind], KINDS[kind].scalars()
+    (thickness,) = scalarize(own.thickness(*own.variables()))
+    return compile_numpy([thickness, *gradient(thickness, scalars)], scalars)
 
 
 @cache
