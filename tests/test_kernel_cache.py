@@ -125,9 +125,11 @@ def test_kernels_of_other_formulas_are_other_kernels():
 
 FIT = """
 import sys, hashlib, numpy, torch, sdf2vec
+from sdf2vec.fit.presets import PRESETS
 from sdf2vec.render import fused
 from sdf2vec.render.tensors import from_scene
-pixels = numpy.random.default_rng(0).random((40, 60, 3))
+PRESETS["fast"] = PRESETS["fast"].paced(0.1)
+pixels = numpy.random.default_rng(0).random((20, 30, 3))
 if sys.argv[1] == "draw":
     one = sdf2vec.Shape.of("circle", (1, 0, 0), center=(0, 0), radius=0.3)
     with torch.no_grad():

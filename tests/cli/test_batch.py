@@ -170,20 +170,23 @@ def test_interrupted_twice_it_still_says_what_is_not_done(album, capfd, monkeypa
 
 
 def test_two_processes_make_the_same_files_as_one(album):
-    """And one that is killed takes nothing with it: its picture is begun anew."""
+    """And one that is killed takes nothing with it: its picture is begun anew.
+
+    So many shapes are fitted from one start.
+    """
     (album / "album/bad.png").write_bytes(b"no picture")
-    command = [sys.executable, "-m", "sdf2vec.cli", "album", "--recursive", *SHORT, *JSON]
+    command = [sys.executable, "-m", "sdf2vec.cli", "album", "--shapes", "64", "--preset", "fast", *JSON]
     outcomes = [
         subprocess.run([*command, *more], capture_output=True, text=True, check=False)
         for more in (("-o", "one"), ("-o", "two", "--jobs", "2", "--report", "r.jsonl"))
     ]
     assert [outcome.returncode for outcome in outcomes] == [3, 3]
-    for name in ("a", "b", "deep/c", "deep/er/a"):
+    for name in ("a", "b"):
         made = [(album / out / f"{name}.scene.json").read_bytes() for out in ("one", "two")]
         assert made[0] == made[1]
-    assert sorted(row["status"] for row in rows_of(album / "r.jsonl")) == ["failed", *["ok"] * 4]
-    assert outcomes[1].stdout.splitlines()[-1] == "5 pictures: 4 done, 1 failed"
-    assert outcomes[1].stdout.count("fitted in") == 4
+    assert sorted(row["status"] for row in rows_of(album / "r.jsonl")) == ["failed", "ok", "ok"]
+    assert outcomes[1].stdout.splitlines()[-1] == "3 pictures: 2 done, 1 failed"
+    assert outcomes[1].stdout.count("fitted in") == 2
 
 
 def test_a_picture_that_kills_its_process_is_tried_some_times(folder, run, monkeypatch):

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from sdf2vec.engines import resvg
-from sdf2vec.fit.presets import PRESETS, Phase, Preset, Relocation
+from sdf2vec.fit.presets import DEFAULT, PRESETS, Phase, Preset, Relocation
 from sdf2vec.image import Picture
 
 
@@ -18,6 +18,13 @@ def short_fits(monkeypatch):
     monkeypatch.setitem(PRESETS, "fast", fast)
     phases = tuple(replace(phase, steps=12) for phase in PRESETS["thesis"].phases)
     monkeypatch.setitem(PRESETS, "thesis", replace(PRESETS["thesis"], phases=phases))
+
+
+@pytest.fixture
+def few_steps(monkeypatch):
+    """A tenth of the steps of two presets, for what does not depend on how near a fit comes in the end."""
+    for name in ("fast", DEFAULT):
+        monkeypatch.setitem(PRESETS, name, PRESETS[name].paced(0.1))
 
 
 @pytest.fixture

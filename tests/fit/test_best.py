@@ -23,13 +23,14 @@ GREY = (0.5, 0.5, 0.5)
 
 
 def test_a_half_transparent_picture_is_its_ground():
-    """The example of a flat picture of 1 × 2000: 11 to 16 dB, when shapes alone had to make up its alpha."""
-    pixels = np.full((2000, 1, 4), 128, np.uint8)
+    """The example of a flat picture of 1 × 500: 11 to 16 dB, when shapes alone had to make up its alpha."""
+    pixels = np.full((500, 1, 4), 128, np.uint8)
     scene = sdf2vec.fit(pixels, 5, preset="fast")
     assert psnr_of(scene, load(pixels)) > 60
     assert scene.ground == pytest.approx((128 / 255 * 128 / 255,) * 3 + (128 / 255,), abs=1e-3)
 
 
+@pytest.mark.usefixtures("few_steps")
 @pytest.mark.parametrize("level", [0, 3, 128, 255])
 def test_one_pixel_of_any_alpha(level):
     """Where shapes could not be fainter than their least opacity."""
@@ -68,6 +69,7 @@ def test_the_best_state_is_gone_back_to():
     assert scene.background.tolist() == [1.0] * 4
 
 
+@pytest.mark.usefixtures("few_steps")
 def test_a_fit_that_runs_away_ends_where_it_was_best(monkeypatch):
     usual = fitted(picture())
     step = loop.Fit._step

@@ -11,6 +11,8 @@ from sdf2vec.image import load
 from tests.fit.drawn import noise
 from tests.scenes import random_scene
 
+pytestmark = pytest.mark.usefixtures("few_steps")
+
 
 def by_count(most, ground=0.0):
     """All of the limit at so many shapes."""

@@ -98,7 +98,7 @@ def test_what_rounding_loses_is_made_up_for():
 
 
 def test_many_sorts_of_layers_are_made_up_for_too(monkeypatch):
-    """Twenty: four kinds, each by itself and with one of them cut out; as where they are too many for least squares.
+    """Ten: four kinds, by themselves or with one of them cut out; as where they are too many for least squares.
 
     What is near already is not farther than by rounding.
     """
@@ -107,6 +107,7 @@ def test_many_sorts_of_layers_are_made_up_for_too(monkeypatch):
         Layer((moved(shape, across, down), *holes), 0.02, 0.9, (Joint("subtraction"),) * len(holes))
         for across, shape in enumerate(SHAPES)
         for down, hole in enumerate((None, *HOLES))
+        if (across + down) % 2 == 0
         for holes in ([moved(hole, across, down)] if hole else [],)
     ]
     scene = Scene(96, 72, tuple(layers), (0.2, 0.4, 0.6))

@@ -43,9 +43,10 @@ def drawn(scene: Scene, channels: int) -> torch.Tensor:
 # --- importance --------------------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("compositing", ["over", "additive"])
-@pytest.mark.parametrize("transparent", [False, True])
-@pytest.mark.parametrize("weighted", [False, True])
+@pytest.mark.parametrize(
+    ("compositing", "transparent", "weighted"),
+    [("over", False, True), ("over", True, False), ("additive", False, False), ("additive", True, True)],
+)
 def test_importance_is_what_the_image_loses(monkeypatch, compositing, transparent, weighted):
     """Against leaving each layer out; the probes' spread is that of a mean of squares, at most √(2/probes)."""
     monkeypatch.setattr(growth, "PROBES", 500)
