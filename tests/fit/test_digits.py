@@ -43,6 +43,7 @@ def test_a_scene_has_the_digits_that_its_picture_needs(noise):
     assert loads(dumps(found)) == found
 
 
+@pytest.mark.usefixtures("few_steps")
 def test_a_palette_stays_what_it_is():
     picture = Picture(np.random.default_rng(0).random((16, 16, 3), np.float32))
     scene = fit(picture, 5, preset="fast", palette="#123456,#fedcba")
@@ -66,6 +67,7 @@ def test_nothing_gets_thinner_than_a_pixel():
     assert float(widths.min()) > 0.9999 / 32
 
 
+@pytest.mark.usefixtures("few_steps")
 @pytest.mark.parametrize("count", [12, 30])
 def test_a_fit_goes_on_from_about_as_many_in_half_the_steps(count):
     """And comes about as near as one from nothing: half a dB less on average; not where it ends with trials."""

@@ -4,11 +4,13 @@ import os
 import subprocess
 import sys
 from typing import Any
+from unittest.mock import patch
 
 import numpy as np
 import pytest
 
 import sdf2vec
+from sdf2vec.fit.presets import PRESETS
 
 NOISE = np.random.default_rng(0).integers(0, 256, (33, 47, 3), dtype=np.uint8)
 SQUARE = np.full((24, 24, 3), 255, np.uint8)
@@ -20,8 +22,10 @@ PICTURES: dict[str, tuple[np.ndarray, dict[str, Any]]] = {
 
 
 def made(name):
+    """The text of a scene fitted in a fifth of the usual steps."""
     pixels, options = PICTURES[name]
-    return sdf2vec.dumps(sdf2vec.fit(pixels, seed=5, preset="fast", **options))
+    with patch.dict(PRESETS, short=PRESETS["fast"].paced(0.2)):
+        return sdf2vec.dumps(sdf2vec.fit(pixels, seed=5, preset="short", **options))
 
 
 @pytest.mark.parametrize(("name", "several"), [("painted", "128"), ("drawn", "18")])
