@@ -38,7 +38,6 @@ def test_a_fit_is_near_the_picture(compositing, alpha):
     assert (scene.width, scene.height) == (48, 32)
 
 
-@pytest.mark.usefixtures("few_steps")
 @pytest.mark.parametrize("kind", KINDS)
 def test_every_kind_fits(kind):
     pic = picture()
@@ -48,7 +47,6 @@ def test_every_kind_fits(kind):
     assert {layer.structure for layer in scene.layers} == {(Part(kind),)}
 
 
-@pytest.mark.usefixtures("few_steps")
 @pytest.mark.parametrize("loss", losses.LOSSES)
 def test_every_loss_is_zero_when_equal_and_falls_in_a_fit(loss):
     target = as_tensor(picture())
