@@ -56,7 +56,7 @@ def test_a_tighter_limit_takes_no_more_from_the_picture_than_it_must(softest, re
     r = random.Random(9)
     layers = tuple(
         Layer((random_shape(("triangle", "ellipse", "box")[i % 3], r),), r.uniform(0.2, 1.0) * softest, 0.8)
-        for i in range(24)
+        for i in range(12)
     )
     scene = Scene(240, 180, layers, (0.5, 0.5, 0.5))
     wanted = rendered(scene, 480, 360)
