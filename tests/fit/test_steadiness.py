@@ -24,8 +24,8 @@ PICTURES: dict[str, tuple[np.ndarray, dict[str, Any]]] = {
 def made(name):
     """The text of a scene fitted in a fifth of the usual steps."""
     pixels, options = PICTURES[name]
-    with patch.dict(PRESETS, short=PRESETS["fast"].paced(0.2)):
-        return sdf2vec.dumps(sdf2vec.fit(pixels, seed=5, preset="short", **options))
+    with patch.dict(PRESETS, fast=PRESETS["fast"].paced(0.2)):
+        return sdf2vec.dumps(sdf2vec.fit(pixels, seed=5, preset="fast", **options))
 
 
 @pytest.mark.parametrize(("name", "several"), [("painted", "128"), ("drawn", "18")])

@@ -1,6 +1,7 @@
 """Drawings that are made once for several limits of their size."""
 
 from functools import cache
+from typing import Any
 
 import pytest
 
@@ -10,7 +11,7 @@ from sdf2vec.export import svg as svg_module
 
 def remembered(function):
     """The function, which gives the same for the same: what it has been given may be unhashable."""
-    known = []
+    known: list[tuple[Any, Any]] = []
 
     def again(given):
         for before, found in known:
