@@ -376,7 +376,7 @@ def test_functions_stay_functions():
     """They share their names with packages that are imported on the way."""
     code = """
 import numpy, sdf2vec
-scene = sdf2vec.fit(numpy.zeros((4, 4, 3)), 1, preset="fast")
+scene = sdf2vec.fit(numpy.zeros((4, 4, 3)), 1, preset="fast", callback=lambda progress: True)
 sdf2vec.render(scene), sdf2vec.export(scene, "svg"), sdf2vec.check(scene, ["glsl"], [(4, 4)])
 import sdf2vec.fit.loop, sdf2vec.render.reference, sdf2vec.export.shader, sdf2vec.roundtrip
 from types import FunctionType
