@@ -380,6 +380,7 @@ class Fit:
         image = self._draw(self.tensors, stage.target)
         loss = float(stage.measure(image).detach())
         scores = self._scores(image, stage)
+        del image  # with what its derivatives follow from, beside which no steps can be recorded
         fresh = anywhere(stage.target, count, self.tensors, self.layers, self.generator)
         relocate(self.tensors, self.optimizer, scores, fresh)
         first = self.tensors.layer_count - count

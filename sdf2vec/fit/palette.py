@@ -53,7 +53,8 @@ def snap(tensors: SceneTensors, palette: Sequence[Color]) -> None:
             colors.copy_(_nearest(colors.cpu(), choices).to(colors.device))
     if not tensors.transparent:
         ground = straight(tensors.background[None])[:, :3].cpu()
-        tensors.background[:3] = _nearest(ground, choices)[0] * tensors.background[3]
+        nearest = _nearest(ground, choices)[0].to(tensors.background.device)
+        tensors.background[:3] = nearest * tensors.background[3]
 
 
 def _nearest(colors: torch.Tensor, choices: torch.Tensor) -> torch.Tensor:

@@ -105,6 +105,7 @@ def recorded(value: Value, composite: Composite, optimizer: Adam, keep: Callable
     try:
         return Recorded(value, optimizer, keep)
     except RuntimeError as error:
+        _keeper.cache_clear()  # its memory still waits for the end of what was being recorded
         reason = str(error).strip().partition("\n")[0]
         warnings.warn(
             f"the steps of a fit can't be recorded here, and take longer ({reason})",
@@ -121,7 +122,7 @@ def _graph_of(work: Callable[[], object], pool: Any = None) -> Any:
     graph = torch.cuda.CUDAGraph()
 
     def recorded() -> None:
-        graph.capture_begin(pool=pool or _pool())
+        graph.capture_begin(pool=pool or _keeper().pool())
         try:
             work()
         finally:
@@ -143,12 +144,6 @@ def _aside(work: Callable[[], None]) -> None:
 @cache
 def _stream() -> Any:
     return torch.cuda.Stream()
-
-
-@cache
-def _pool() -> Any:
-    """The memory of what is recorded, kept for what is recorded next."""
-    return _keeper().pool()
 
 
 @cache
