@@ -58,15 +58,6 @@ class Moving:
             eps=EPSILON,
         )
 
-    def products(self) -> torch.Tensor:
-        """Of the derivative and of its running mean, in units of Adam's steps: their product, and both squared [3]."""
-        if self.tensor.grad is None:
-            return self.mean.new_zeros(3)
-        now, before = self.tensor.grad.flatten(), self.mean.flatten()
-        units = self.square.flatten() + EPSILON**2
-        scaled = before / units
-        return torch.stack([now.dot(scaled), now.dot(now / units), before.dot(scaled)])
-
 
 class Adam:
     """Adam (Kingma and Ba 2015) with β₁ = β₂ = 0.9: a shape that moves soon meets other slopes."""
@@ -92,15 +83,23 @@ class Adam:
 
     @torch.no_grad()
     def products(self) -> torch.Tensor:
-        """Of all derivatives and their running means: see `Moving.products` [3]."""
-        return torch.stack([moving.products() for moving in self.moving]).sum(0)
+        """Of all derivatives and their running means, in units of Adam's steps: their product, and both squared [3]."""
+        told = [moving for moving in self.moving if moving.tensor.grad is not None]
+        now = torch.cat([grad.flatten() for grad in self.grads])
+        before, squares = (
+            torch.cat([part.flatten() for part in parts])
+            for parts in zip(*((moving.mean, moving.square) for moving in told), strict=True)
+        )
+        units = squares + EPSILON**2
+        scaled = before / units
+        return torch.stack([now.dot(scaled), now.dot(now / units), before.dot(scaled)])
 
     def agreement(self) -> float:
         """The cosine of the angle between the present derivative and the steps of late: near 1 where they are short.
 
         What hypergradient descent follows (Baydin et al. 2018). 0 before the first step.
         """
-        return cosine(*self.products().tolist()) if self.moving else 0.0
+        return cosine(*self.products().tolist()) if self.grads else 0.0
 
     @torch.no_grad()
     def forget(self) -> None:

@@ -44,7 +44,10 @@ class Plain:
         return float(value.detach())
 
     def drop_what_is_not_finite(self) -> int:
-        lost = [grad for grad in self.optimizer.grads if not math.isfinite(float(grad.sum()))]
+        grads = self.optimizer.grads
+        if not grads or math.isfinite(float(torch.cat([grad.flatten() for grad in grads]).sum())):
+            return 0
+        lost = [grad for grad in grads if not math.isfinite(float(grad.sum()))]
         for grad in lost:
             grad.nan_to_num_(0.0, 0.0, 0.0)
         return len(lost)
