@@ -162,15 +162,15 @@ PRESETS: dict[str, Preset] = {
     "balanced": Preset(
         (
             Phase("coarse", 300, 96, relocation=OFTEN, growth=Growth(16, 40)),
-            Phase("middle", 400, 160, rate=0.8, end_rate=0.6, relocation=OFTEN),
-            Phase("fine", 110, 288, rate=0.6, end_rate=0.2, loss=L1_MSE),
-            Phase("finish", 50, 384, rate=0.2, end_rate=0.02, loss=L1_MSE_FLIP),
+            Phase("middle", 400, 176, rate=0.8, end_rate=0.6, loss=L1_MSE, relocation=OFTEN),
+            Phase("fine", 110, 320, rate=0.6, end_rate=0.2, loss=L1_MSE),
+            Phase("finish", 50, 512, rate=0.2, end_rate=0.02, loss=L1_MSE_FLIP),
         )
     ),
     "best": Preset(
         (
             Phase("coarse", 600, 96, relocation=OFTEN, growth=Growth(16, 40)),
-            Phase("middle", 800, 192, rate=0.8, end_rate=0.6, relocation=OFTEN),
+            Phase("middle", 800, 192, rate=0.8, end_rate=0.6, loss=L1_MSE, relocation=OFTEN),
             Phase("fine", 300, 512, rate=0.6, end_rate=0.2, loss=L1_MSE),
             Phase("finish", 100, 512, rate=0.2, end_rate=0.02, loss=L1_MSE_FLIP),
         )
