@@ -57,6 +57,7 @@ def smoothed(scene):
     return dataclasses.replace(scene, layers=tuple(joined))
 
 
+@cache
 def many(count, seed=0, width=60, height=40):
     """Small soft triangles and boxes, without unions."""
     r = random.Random(seed)
@@ -120,10 +121,10 @@ def test_what_cuts_a_layer_may_lie_far_outside(join, require_engine):
 
 
 def test_many_shapes(require_engine):
-    """4096 shapes, against the dense reference, finer and coarser than the lists are made for."""
+    """1200 shapes, against the dense reference, finer and coarser than the lists are made for."""
     require_engine("opengl")
     require_engine("webgpu")
-    scene = many(4096)
+    scene = many(1200)
     for target in ("glsl", "wgsl"):
         made = shader(scene, target, Options())
         assert made.choice.layout == "data"
@@ -328,7 +329,7 @@ def test_short_numbers(value, text):
 
 
 def test_the_choice_follows_size_and_host():
-    few, some, lots = random_scene(layers=6), many(300), many(4096)
+    few, some, lots = random_scene(layers=6), many(300), many(1200)
     assert choose(few, "auto", FILE).layout == "readable"
     assert choose(some, "auto", FILE).layout == "tiled"
     assert choose(lots, "auto", FILE).layout == "data"
@@ -371,7 +372,7 @@ def test_glslang_accepts_every_layout(layout, version, compositing, require_engi
     for kinds in (("triangle",), tuple(KINDS)):
         scene = random_scene(kinds, compositing, layers=6, seed=10)
         assert glslang_validate(shader(scene, "glsl", Options(layout=layout, glsl=version)).text) is None
-        if layout != "data":
+        if layout != "data" and version == "es300":  # which a Shadertoy is whatever the version
             text = shader(scene, "shadertoy", Options(layout=layout, animate=True)).text
             assert glslang_validate(SHADERTOY_HEAD + text + SHADERTOY_TAIL) is None
 
