@@ -2,6 +2,7 @@
 
 import math
 import warnings
+from functools import cache
 
 import numpy as np
 import pytest
@@ -63,7 +64,8 @@ def test_only_what_is_better_is_kept():
     assert not steady.holds(RUNS_AWAY + 0.01, tensors, adam)  # by small steps
 
 
-def at_rate(times, seed=0):
+@cache
+def at_rate(times, seed):
     name = f"rate {times}"
     PRESETS[name] = PRESETS["fast"].paced(rate=times)
     try:
@@ -84,7 +86,9 @@ def test_steps_thirty_times_too_large_are_survived_and_said():
         wild, said = at_rate(30.0, seed)
         assert "ran away" in said[0]
         lost.append(psnr_of(usual, picture()) - psnr_of(wild, picture()))
-    assert sorted(lost)[1] < 8.0
+        if sum(each < 8.0 for each in lost) == 2:
+            return
+    pytest.fail(f"off by {lost} dB")
 
 
 def test_derivatives_that_are_no_numbers_move_nothing(monkeypatch):
@@ -155,8 +159,8 @@ def test_steps_get_no_longer_than_at_the_units_own_rates():
 
 def test_rates_a_tenth_as_high_are_raised():
     """Without longer steps: 8 to 9 dB less."""
-    usual, _ = at_rate(1.0)
-    slow, said = at_rate(0.1)
+    usual, _ = at_rate(1.0, 0)
+    slow, said = at_rate(0.1, 0)
     assert said == []
     assert psnr_of(slow, picture()) > psnr_of(usual, picture()) - 4.5
 
