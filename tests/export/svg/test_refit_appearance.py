@@ -81,8 +81,8 @@ def test_faint_layers_add_up(engine, profile, require_engine):
             "frequency": (r.uniform(9.0, 20.0), r.uniform(9.0, 20.0)),
         }
         layers.append(Layer((Shape.of("displaced", (0.9, 0.6, 0.3), **look),), r.uniform(0.2, 0.4), 0.05))
-    scene = Scene(160, 160, tuple(layers), None)
-    for size in (None, (240, 240), (200, 160)):
+    scene = Scene(96, 96, tuple(layers), None)
+    for size in (None, (144, 144), (120, 96)):
         off = off_in(engine, scene, size, svg_profile=profile)
         assert decibels(off) >= (36 if profile == "filters" else 31.5)
         assert abs(off[..., 3].mean()) <= 3.0 / 255
