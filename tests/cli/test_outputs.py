@@ -315,11 +315,11 @@ def test_thin_pictures(folder, run, size, kind):
 
 
 def test_a_large_picture(folder, run):
-    Image.linear_gradient("L").resize((4000, 3000)).save(folder / "large.bmp")
+    Image.linear_gradient("L").resize((2000, 1500)).save(folder / "large.bmp")
     outcome = run("large.bmp", *SHORT, "--shapes", "5", "--kind", "circle", "--emit", "json,svg")
     assert outcome.code == 0
-    assert outcome.out.startswith(b"large.bmp: 4000 x 3000, 5 shapes")
-    assert sdf2vec.load(folder / "large.scene.json").height == 3000
+    assert outcome.out.startswith(b"large.bmp: 2000 x 1500, 5 shapes")
+    assert sdf2vec.load(folder / "large.scene.json").height == 1500
 
 
 def test_a_transparent_picture(folder, run):
