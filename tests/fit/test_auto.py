@@ -194,7 +194,7 @@ DISCS = WHITE + "".join(
 
 
 @pytest.mark.usefixtures("few_steps")
-@pytest.mark.parametrize("count", [3, 6, 40])
+@pytest.mark.parametrize("count", [3, 40])
 def test_a_drawing_is_searched_for_as_many_shapes_as_told(count, drawn):
     """Triangles on the discs that there are, where more are wanted."""
     picture = drawn(DISCS)
@@ -223,7 +223,7 @@ def test_the_fast_preset_does_not_search_for_as_many_shapes_as_told(drawn, monke
 
 def test_an_enlarged_photograph_is_not_searched_for_as_many_shapes_as_told():
     """Its pixels are like their neighbours, but not where it is small."""
-    large = Image.fromarray(data.astronaut()).resize((3400, 3400), Image.Resampling.BICUBIC)
+    large = Image.fromarray(data.astronaut()[:256, 100:356]).resize((1700, 1700), Image.Resampling.BICUBIC)
     picture = Picture((np.asarray(large) / 255).astype(np.float32))
     assert Drawn.of(picture).flat
     assert auto._few(picture, settings_of(8), lambda progress: False) is None
