@@ -48,7 +48,7 @@ CPU = Backend(
     },
     fused.is_compiled,
 )
-CUDA = Backend("cuda", composite_triton, steps=deferred("sdf2vec.fit.recorded", "recorded"))
+CUDA = Backend("cuda", composite_triton, steps=deferred("sdf2vec.fit.recorded", "Recorded"))
 CUDA_BY_TORCH = Backend("cuda", culled.composite)
 MPS = Backend("mps", culled.composite)
 

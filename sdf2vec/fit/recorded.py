@@ -11,14 +11,13 @@ from typing import Any, NamedTuple
 
 import torch
 
-from ..render.triton_fused import Room, composite
+from ..render.triton_fused import Room
+from ..render.triton_fused import composite as composite_triton
 from .adam import Adam, cosine
-from .steps import Composite, Plain, Steps, Value
+from .steps import Composite, Plain, Value
 
-ROOMY, SPARE = (
-    1.5,
-    1024,
-)  # times the pairs of a tile and a layer that there are, and so many more: they change
+# times the pairs of a tile and a layer that there are, and so many more, for which a step has memory: they change
+ROOMY, SPARE = 1.5, 1024
 
 
 class Said(NamedTuple):
@@ -34,15 +33,17 @@ class Said(NamedTuple):
 
 class Recorded:
     """Steps as two graphs, of derivatives and of Adam; recorded anew where more tiles are touched than there is room
-    for. The scene, the optimizer and their tensors are those of the beginning.
+    for. Where something in them can't be recorded, which is said, they are as usual.
+
+    The scene, the optimizer and their tensors are those of the beginning.
     """
 
-    derivatives: Any  # torch.cuda.CUDAGraph
-    adam: Any
+    graphs: tuple[Any, Any] | None  # torch.cuda.CUDAGraph
     read: Said
     most: int  # pairs that there is room for
 
-    def __init__(self, value: Value, optimizer: Adam, keep: Callable[[], None]) -> None:
+    def __init__(self, value: Value, composite: Composite, optimizer: Adam, keep: Callable[[], None]) -> None:
+        self.plain = Plain(value, composite, optimizer, keep)
         self.value, self.optimizer, self.keep = value, optimizer, keep
         self.factor = optimizer.moving[0].tensor.new_ones(())
         self.said = torch.zeros(len(Said._fields), dtype=torch.float64, device=self.factor.device)
@@ -51,35 +52,46 @@ class Recorded:
         self._record()
 
     def slope(self) -> float:
-        self.derivatives.replay()
-        self.read = Said(*self.said.tolist())
-        if self.read.pairs > self.most:
+        while self.graphs:
+            self.graphs[0].replay()
+            self.read = Said(*self.said.tolist())
+            if self.read.pairs <= self.most:
+                return self.read.value
             self._record()
-            return self.slope()
-        return self.read.value
+        return self.plain.slope()
 
     def drop_what_is_not_finite(self) -> int:
-        return int(self.read.lost)
+        return int(self.read.lost) if self.graphs else self.plain.drop_what_is_not_finite()
 
     def agreement(self) -> float:
-        return cosine(self.read.both, self.read.now, self.read.before)
+        read = self.read
+        return cosine(read.both, read.now, read.before) if self.graphs else self.plain.agreement()
 
     def move(self, factor: float) -> None:
+        if not self.graphs:
+            self.plain.move(factor)
+            return
         self.factor.fill_(factor)
-        self.adam.replay()
+        self.graphs[1].replay()
 
     def _record(self) -> None:
         """For about as many pairs as there are now."""
         self.read = Said(*self.said.tolist())
         self.most = round(ROOMY * self.read.pairs) + SPARE
         self.room = Room(self.most)
-        self.derivatives = self._graph_of(self._derive)
-        self.adam = self._graph_of(self._move)
+        try:
+            self.graphs = self._graph_of(self._derive), self._graph_of(self._move)
+        except RuntimeError as error:
+            self.graphs = None
+            _keeper.cache_clear()  # its memory still waits for the end of what was being recorded
+            reason = str(error).strip().partition("\n")[0]
+            message = f"the steps of a fit can't be recorded here, and take longer ({reason})"
+            warnings.warn(message, RuntimeWarning, stacklevel=2)
 
     def _derive(self) -> None:
         """All derivatives, those that are no numbers 0, and what they say."""
         self.optimizer.zero_grad()
-        value = self.value(partial(composite, room=self.room))
+        value = self.value(partial(composite_triton, room=self.room))
         value.backward()
         pairs = self.room.needed
         lost = value.new_zeros(())
@@ -98,21 +110,6 @@ class Recorded:
 
     def _aside(self, work: Callable[[], None]) -> None:
         _aside(work)
-
-
-def recorded(value: Value, composite: Composite, optimizer: Adam, keep: Callable[[], None]) -> Steps:
-    """Recorded steps; others where something in them can't be recorded, which is said."""
-    try:
-        return Recorded(value, optimizer, keep)
-    except RuntimeError as error:
-        _keeper.cache_clear()  # its memory still waits for the end of what was being recorded
-        reason = str(error).strip().partition("\n")[0]
-        warnings.warn(
-            f"the steps of a fit can't be recorded here, and take longer ({reason})",
-            RuntimeWarning,
-            stacklevel=2,
-        )
-        return Plain(value, composite, optimizer, keep)
 
 
 # --- CUDA ---------------------------------------------------------------------------------------------------

@@ -57,8 +57,7 @@ def begun(make, radius=0.1, spoilt=False):
         return error
 
     keep = partial(project, scene, 1.0 / HEIGHT)
-    given = (value, composite, optimizer, keep) if make is Plain else (value, optimizer, keep)
-    return make(*given), scene
+    return make(value, composite, optimizer, keep), scene
 
 
 def recording():
@@ -84,12 +83,10 @@ def test_recorded_steps_are_those_of_torch():
 def test_shapes_that_grow_beyond_the_room_are_recorded_anew(monkeypatch):
     monkeypatch.setattr(recorded, "ROOMY", 1.0)
     monkeypatch.setattr(recorded, "SPARE", 0)
-    made, scene = begun(recording())
-    before = made.most
-    with torch.no_grad():
-        scene.groups[0].of("radius", 0).fill_(0.6)
+    before = begun(recording())[0].most
+    made, _, value = outgrown(recording())
     plain, _ = begun(Plain, radius=0.6)
-    assert made.slope() == pytest.approx(plain.slope(), rel=1e-5)
+    assert value == pytest.approx(plain.slope(), rel=1e-5)
     assert made.most > before
     for moving, other in zip(made.optimizer.moving, plain.optimizer.moving, strict=True):
         assert torch.allclose(moving.tensor.grad, other.tensor.grad, rtol=1e-4, atol=1e-7)
@@ -105,14 +102,47 @@ def test_derivatives_that_are_no_numbers_are_counted_and_move_nothing():
     assert scene.groups[0].of("radius", 0).flatten().tolist() == pytest.approx([0.1, 0.1])
 
 
+def outgrown(make):
+    """Steps of discs that have grown since they were begun, the scene, and what is descended."""
+    made, scene = begun(make)
+    with torch.no_grad():
+        scene.groups[0].of("radius", 0).fill_(0.6)
+    return made, scene, made.slope()
+
+
+def test_what_cannot_be_recorded_is_done_as_usual(monkeypatch):
+    """At first, and where there is room for more no longer."""
+
+    class Refused(Repeated):
+        left = 0
+
+        def _graph_of(self, work):
+            if not Refused.left:
+                raise RuntimeError("not permitted\nwhile recording")
+            Refused.left -= 1
+            return super()._graph_of(work)
+
+    monkeypatch.setattr(recorded, "ROOMY", 1.0)
+    monkeypatch.setattr(recorded, "SPARE", 0)
+    for Refused.left in (0, 2):
+        with pytest.warns(RuntimeWarning, match=r"can't be recorded.*\(not permitted\)$"):
+            made, scene, value = outgrown(Refused)
+        plain, other = begun(Plain, radius=0.6)
+        assert value == pytest.approx(plain.slope(), rel=1e-5)
+        assert made.drop_what_is_not_finite() == 0
+        assert made.agreement() == plain.agreement() == 0.0
+        for steps in (made, plain):
+            steps.move(0.5)
+        assert torch.allclose(numbers(scene), numbers(other), atol=1e-5)
+
+
 @pytest.mark.skipif(DEVICE != "cuda", reason="needs an NVIDIA GPU")
-def test_what_cannot_be_recorded_is_done_by_torch():
+def test_what_waits_for_the_gpu_cannot_be_recorded():
     def value(renderer):
         error = scene.background.square().sum()
-        return error * float(error.detach())  # waits for the GPU
+        return error * float(error.detach())
 
     scene = from_scene(Scene(8, 8, (), (0.5, 0.5, 0.5)), device=DEVICE)
     with pytest.warns(RuntimeWarning, match="can't be recorded"):
-        steps = recorded.recorded(value, composite, adam_over(scene), lambda: None)
-    assert isinstance(steps, Plain)
-    assert steps.slope() == pytest.approx(0.75**2 + 2 * 0.75 + 1.0)
+        steps = Recorded(value, composite, adam_over(scene), lambda: None)
+    assert steps.slope() == pytest.approx(1.75**2)
