@@ -52,7 +52,7 @@ def test_square_ends_and_unlike_widths_stay():
     assert [row[3] * SIDE for row in found] == pytest.approx([5, 5, 7], abs=0.1)
 
 
-def test_what_ends_unseen_under_others_stays_a_box():
+def test_what_ends_unseen_under_others_stays_a_box_unless_there_is_a_pen_of_its_width():
     ends = [disc(x, 25, 9) for x in (23, 73)]
     pixels = painted((box(23, 20, 73, 30), BLUE, 1.0), (ends[0] | ends[1], (0.0, 0.0, 0.0), 1.0))
     over = [
@@ -62,6 +62,12 @@ def test_what_ends_unseen_under_others_stays_a_box():
         for x in (23, 73)
     ]
     assert after([bar(25, 5, 0), *over], pixels)[0][5] == 0.0
+    pixels = painted(
+        (box(23, 20, 73, 30) | rounded(60, 5), BLUE, 1.0), (ends[0] | ends[1], (0.0, 0.0, 0.0), 1.0)
+    )
+    pen, other = after([bar(25, 5, 0), *over, bar(60, 5, 4.9)], pixels)[:: len(over) + 1]
+    assert pen[3] == other[3]
+    assert pen[5] == other[5] > 0.0
 
 
 def test_what_is_hardly_longer_than_wide_is_no_stroke():
