@@ -28,6 +28,12 @@ def require_engine() -> Callable[[str], None]:
 
 
 @pytest.fixture
+def triton(require_engine: Callable[[str], None]) -> None:
+    """What runs Triton's kernels goes on only where there is one."""
+    require_engine("triton")
+
+
+@pytest.fixture
 def kernels_there(monkeypatch: pytest.MonkeyPatch) -> None:
     """A fit finds its kernels compiled, whatever has run before: else the first that it says is that it compiles."""
     monkeypatch.setattr(import_module("sdf2vec.render.kernels"), "is_compiled", lambda *arguments: True)

@@ -4,8 +4,13 @@ import os
 from importlib import import_module
 from importlib.util import find_spec
 
+import pytest
 import torch
 
+MARKS = [
+    pytest.mark.filterwarnings("ignore::RuntimeWarning:triton"),  # the interpreter's 0.5 / 0, not selected
+    pytest.mark.usefixtures("triton"),
+]
 DEVICE = "cuda" if torch.cuda.is_available() else "cpu"
 if DEVICE == "cpu":  # before anything imports Triton
     os.environ.setdefault("TRITON_INTERPRET", "1")

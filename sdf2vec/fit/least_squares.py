@@ -67,7 +67,7 @@ class SceneProblem:
         self.scene, self.view = scene, view
         self.channels, height, width = view.target.shape
         rows, columns = -(-height // TILE), -(-width // TILE)
-        x, y, pixel = canvas_axes(scene, columns * TILE, rows * TILE, width, height)
+        x, y, pixel = canvas_axes(scene.size, columns * TILE, rows * TILE, width, height)
         self.pixel = float(pixel)
         weights = torch.ones(height, width) if view.weights is None else view.weights
         beyond = ((0, 0), (0, rows * TILE - height), (0, columns * TILE - width))

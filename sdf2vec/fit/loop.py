@@ -274,9 +274,11 @@ class Fit:
     def _resolution(self, phase: Phase) -> float:
         return self.preset.resolution(phase, self.settings.most)
 
-    def _draw(self, tensors: SceneTensors, target: torch.Tensor) -> torch.Tensor:
+    def _draw(
+        self, tensors: SceneTensors, target: torch.Tensor, composite: Composite | None = None
+    ) -> torch.Tensor:
         channels, height, width = target.shape
-        return self.backend.composite(tensors, width, height, channels)
+        return (composite or self.backend.composite)(tensors, width, height, channels)
 
     def _train(self, stage: Stage, moves: Callable[[Group], torch.Tensor] | None = None) -> None:
         """The steps of a phase; `moves` tells which layers of a group are trained, all without it.
@@ -339,8 +341,7 @@ class Fit:
 
     def _value(self, stage: Stage, composite: Composite) -> torch.Tensor:
         """What is descended."""
-        channels, height, width = stage.target.shape
-        value = stage.measure(composite(self.tensors, width, height, channels))
+        value = stage.measure(self._draw(self.tensors, stage.target, composite))
         if self.preset.least_area > 0:
             least_area = self.preset.least_area * self.size[0] * self.size[1]
             value = value + AREA_WEIGHT * too_small(self.tensors, least_area)

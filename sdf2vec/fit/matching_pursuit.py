@@ -251,7 +251,7 @@ class Size(NamedTuple):
         return cls(radius, down, across, once, twice, _window(torch.arange(-reach, reach + 1), radius))
 
     def cover(self, y: int, x: int, height: int, width: int) -> Cover:
-        """That of the Gaussian that stands for a disc at a pixel, where it is not cut off."""
+        """What the Gaussian covers that stands for a disc at a pixel, where it is not cut off."""
         reach = len(self.window) // 2
         rows, columns = (
             slice(max(at - reach, 0), min(at + reach + 1, side)) for at, side in ((y, height), (x, width))

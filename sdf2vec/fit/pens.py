@@ -23,34 +23,29 @@ def lined(scene: SceneTensors, view: View, search: Search, worst: float) -> Scen
     """
     error = error_of(scene, view)
     limit = max(worst, AS_GOOD * error, error + 4.0 * UNSEEN)
-    for order in sorted(range(scene.layer_count), key=lambda order: _has_corners(layer_at(scene, order))):
-        layer = layer_at(scene, order)
-        if bool(_are_long(layer).any()):
-            around = Surroundings.of(scene, order, view)
-            made = inserted(scene, _rounded(layer, around, search))
-            most = limit
-            if _has_corners(layer) and not _has_pen(scene, layer):
-                most = error_of(inserted(scene, _moved(layer, around, search)), view) - UNSEEN
-            scene = made if error_of(made, view) <= most else scene
+    layers = [layer_at(scene, order) for order in range(scene.layer_count)]
+    for layer in sorted((each for each in layers if _are_long(each).any()), key=_has_corners):
+        around = Surroundings.of(scene, int(layer.order), view)
+        made = inserted(scene, _rounded(layer, around, search))
+        most = limit
+        if _has_corners(layer) and not _has_pen(scene, layer):
+            most = error_of(inserted(scene, _moved(layer, around, search)), view) - UNSEEN
+        scene = made if error_of(made, view) <= most else scene
     made = detached(scene)
     for group in made.groups:
         in_one_width(group, group, ALIKE)
     return made if error_of(made, view) <= limit else scene
 
 
-def _has_corners(layer: Group) -> bool:
-    """Whether a layer is a box that is not rounded."""
-    return [part.kind for part in layer.structure] == ["box"] and not bool(layer.of("corner_radius", 0).any())
+def _has_corners(box: Group) -> bool:
+    """Whether a layer of a box is not rounded."""
+    return not bool(box.of("corner_radius", 0).any())
 
 
-def _has_pen(scene: SceneTensors, layer: Group) -> bool:
+def _has_pen(scene: SceneTensors, box: Group) -> bool:
     """Whether a scene has strokes that are about as wide as a box."""
-    width = _widths(layer).log()
-    return any(
-        bool(((_widths(group).log() - width).abs()[:, 0] < ALIKE)[strokes_of(group)].any())
-        for group in scene.groups
-        if [part.kind for part in group.structure] == ["box"]
-    )
+    pens = [(group, own) for group in scene.groups if (own := strokes_of(group)).any()]
+    return any(bool(((_widths(group)[own] / _widths(box)).log().abs() < ALIKE).any()) for group, own in pens)
 
 
 def _rounded(layer: Group, around: Surroundings, search: Search) -> Group:

@@ -31,7 +31,7 @@ class Said(NamedTuple):
     before: float
 
 
-class Recorded:
+class Recorded(Plain):
     """Steps as two graphs, of derivatives and of Adam; recorded anew where more tiles are touched than there is room
     for. Where something in them can't be recorded, which is said, they are as usual.
 
@@ -43,12 +43,11 @@ class Recorded:
     most: int  # pairs that there is room for
 
     def __init__(self, value: Value, composite: Composite, optimizer: Adam, keep: Callable[[], None]) -> None:
-        self.plain = Plain(value, composite, optimizer, keep)
-        self.value, self.optimizer, self.keep = value, optimizer, keep
+        super().__init__(value, composite, optimizer, keep)
         self.factor = optimizer.moving[0].tensor.new_ones(())
         self.said = torch.zeros(len(Said._fields), dtype=torch.float64, device=self.factor.device)
         self.room = Room()
-        self._aside(self._derive)  # once as usual: all kernels are compiled
+        _aside(self._derive)  # once as usual: all kernels are compiled
         self._record()
 
     def slope(self) -> float:
@@ -58,18 +57,18 @@ class Recorded:
             if self.read.pairs <= self.most:
                 return self.read.value
             self._record()
-        return self.plain.slope()
+        return super().slope()
 
     def drop_what_is_not_finite(self) -> int:
-        return int(self.read.lost) if self.graphs else self.plain.drop_what_is_not_finite()
+        return int(self.read.lost) if self.graphs else super().drop_what_is_not_finite()
 
     def agreement(self) -> float:
         read = self.read
-        return cosine(read.both, read.now, read.before) if self.graphs else self.plain.agreement()
+        return cosine(read.both, read.now, read.before) if self.graphs else super().agreement()
 
-    def move(self, factor: float) -> None:
+    def move(self, factor: float | torch.Tensor) -> None:
         if not self.graphs:
-            self.plain.move(factor)
+            super().move(factor)
             return
         self.factor.fill_(factor)
         self.graphs[1].replay()
@@ -80,7 +79,8 @@ class Recorded:
         self.most = round(ROOMY * self.read.pairs) + SPARE
         self.room = Room(self.most)
         try:
-            self.graphs = self._graph_of(self._derive), self._graph_of(self._move)
+            adam = partial(super().move, self.factor)
+            self.graphs = _graph_of(self._derive), _graph_of(adam)
         except RuntimeError as error:
             self.graphs = None
             _keeper.cache_clear()  # its memory still waits for the end of what was being recorded
@@ -100,16 +100,6 @@ class Recorded:
             grad.nan_to_num_(0.0, 0.0, 0.0)
         told = [value.detach(), value.new_zeros(()) if pairs is None else pairs, lost]
         self.said.copy_(torch.cat([torch.stack([each.double() for each in told]), self.optimizer.products()]))
-
-    def _move(self) -> None:
-        self.optimizer.step(self.factor)
-        self.keep()
-
-    def _graph_of(self, work: Callable[[], None]) -> Any:
-        return _graph_of(work)
-
-    def _aside(self, work: Callable[[], None]) -> None:
-        _aside(work)
 
 
 # --- CUDA ---------------------------------------------------------------------------------------------------

@@ -55,6 +55,6 @@ class Plain:
     def agreement(self) -> float:
         return self.optimizer.agreement()
 
-    def move(self, factor: float) -> None:
+    def move(self, factor: float | torch.Tensor) -> None:
         self.optimizer.step(factor)
         self.keep()

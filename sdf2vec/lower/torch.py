@@ -36,7 +36,6 @@ def _spell(like: str, node: Expr, args: list[str]) -> str:
     text = OPERATIONS[node.op].torch
     assert text is not None, f"{node.op} must be scalarized first"
     if node.op == "select" and node.args[1].op == node.args[2].op == "const":
-        args[1] = (
-            f"{like}.new_full((), {args[1]})"  # two bare numbers would come out in torch's default dtype
-        )
+        # two bare numbers would come out in torch's default dtype
+        args[1] = f"{like}.new_full((), {args[1]})"
     return text.format(*args)

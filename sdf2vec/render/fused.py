@@ -40,7 +40,7 @@ def composite(tensors: SceneTensors, width: int, height: int, channels: int = 4)
 
 def _canvas(tensors: SceneTensors, width: int, height: int, channels: int) -> tuple[_Canvas, torch.Tensor]:
     """What a render needs, and the layers' rows of numbers in draw order."""
-    axes = canvas_axes(tensors, -(-width // TILE) * TILE, -(-height // TILE) * TILE, width, height)
+    axes = canvas_axes(tensors.size, -(-width // TILE) * TILE, -(-height // TILE) * TILE, width, height)
     structures = structures_of(tensors)
     _, index, rows = drawn_rows(tensors, float(axes[2]))
     hides = COMPOSITING[tensors.compositing].hides

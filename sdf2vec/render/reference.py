@@ -76,21 +76,14 @@ def canvas(tensors: SceneTensors, width: int, height: int) -> Tensors:
     return _canvas()(x.flatten(), y.flatten(), *sizes)
 
 
+@lru_cache(maxsize=8)
 def canvas_axes(
-    tensors: SceneTensors, columns: int, rows: int, width: int, height: int
+    size: tuple[float, float], columns: int, rows: int, width: int, height: int
 ) -> tuple[np.ndarray, np.ndarray, np.float32]:
     """Scene coordinates x [columns], y [rows] of pixel centres, and the size of a pixel; float32.
 
-    The canvas has width × height pixels; the axes may go on beyond its edges.
+    The canvas has this size in scene units, and width × height pixels; the axes may go on beyond its edges.
     """
-    return axes_of(tensors.size, columns, rows, width, height)
-
-
-@lru_cache(maxsize=8)
-def axes_of(
-    size: tuple[float, float], columns: int, rows: int, width: int, height: int
-) -> tuple[np.ndarray, np.ndarray, np.float32]:
-    """The same of a canvas of this size in scene units."""
     sizes = [torch.tensor(value, dtype=torch.float64) for value in (width, height, *size)]
     places = torch.arange(max(columns, rows), dtype=torch.float64) + 0.5
     x, y, pixel = _canvas()(places, places, *sizes)

@@ -20,7 +20,7 @@ from ..blend import COMPOSITING
 from ..layer import ROW_OPACITY
 from . import triton_kernels
 from .fused import rows_of, structures_of
-from .reference import axes_of
+from .reference import canvas_axes
 from .tensors import SceneTensors
 from .tiling import PIXELS, TILE
 
@@ -105,7 +105,7 @@ def _axes(
     size: tuple[float, float], width: int, height: int, device: torch.device
 ) -> tuple[torch.Tensor, torch.Tensor, float]:
     """The pixel centres along both axes, padded to whole tiles, and the size of a pixel."""
-    x, y, pixel = axes_of(size, -(-width // TILE) * TILE, -(-height // TILE) * TILE, width, height)
+    x, y, pixel = canvas_axes(size, -(-width // TILE) * TILE, -(-height // TILE) * TILE, width, height)
     return torch.from_numpy(x).to(device), torch.from_numpy(y).to(device), float(pixel)
 
 

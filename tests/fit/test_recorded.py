@@ -14,28 +14,23 @@ from sdf2vec.fit.recorded import Recorded
 from sdf2vec.fit.steps import Plain
 from sdf2vec.render.tensors import from_scene
 from sdf2vec.render.triton_fused import composite
-from tests.triton_device import DEVICE
+from tests.triton_device import DEVICE, MARKS
 
 WIDTH, HEIGHT = 80, 64
-pytestmark = [
-    pytest.mark.filterwarnings("ignore::RuntimeWarning:triton"),  # the interpreter's 0.5 / 0, not selected
-    pytest.mark.usefixtures("triton"),
-]
+pytestmark = MARKS
 
 
-@pytest.fixture
-def triton(require_engine):
-    require_engine("triton")
+def repeated(work):
+    """In place of a graph: does what would be recorded."""
+    return SimpleNamespace(replay=work)
 
 
-class Repeated(Recorded):
-    """Does what would be recorded."""
-
-    def _graph_of(self, work):
-        return SimpleNamespace(replay=work)
-
-    def _aside(self, work):
-        work()
+@pytest.fixture(autouse=True)
+def recording(monkeypatch):
+    """Without a GPU nothing is recorded."""
+    if DEVICE != "cuda":
+        monkeypatch.setattr(recorded, "_graph_of", repeated)
+        monkeypatch.setattr(recorded, "_aside", lambda work: work())
 
 
 def circle(x, radius, color):
@@ -60,16 +55,12 @@ def begun(make, radius=0.1, spoilt=False):
     return make(value, composite, optimizer, keep), scene
 
 
-def recording():
-    return Recorded if DEVICE == "cuda" else Repeated
-
-
 def numbers(scene):
     return torch.cat([scene.groups[0].rows().flatten(), scene.background]).detach()
 
 
 def test_recorded_steps_are_those_of_torch():
-    (plain, ours), (made, theirs) = begun(Plain), begun(recording())
+    (plain, ours), (made, theirs) = begun(Plain), begun(Recorded)
     for factor in (1.0, 0.5, 2.0, 0.1):
         assert made.slope() == pytest.approx(plain.slope(), rel=1e-5)
         assert made.drop_what_is_not_finite() == plain.drop_what_is_not_finite() == 0
@@ -83,8 +74,8 @@ def test_recorded_steps_are_those_of_torch():
 def test_shapes_that_grow_beyond_the_room_are_recorded_anew(monkeypatch):
     monkeypatch.setattr(recorded, "ROOMY", 1.0)
     monkeypatch.setattr(recorded, "SPARE", 0)
-    before = begun(recording())[0].most
-    made, _, value = outgrown(recording())
+    before = begun(Recorded)[0].most
+    made, _, value = outgrown(Recorded)
     plain, _ = begun(Plain, radius=0.6)
     assert value == pytest.approx(plain.slope(), rel=1e-5)
     assert made.most > before
@@ -93,7 +84,7 @@ def test_shapes_that_grow_beyond_the_room_are_recorded_anew(monkeypatch):
 
 
 def test_derivatives_that_are_no_numbers_are_counted_and_move_nothing():
-    (plain, _), (made, scene) = begun(Plain, spoilt=True), begun(recording(), spoilt=True)
+    (plain, _), (made, scene) = begun(Plain, spoilt=True), begun(Recorded, spoilt=True)
     for steps in (plain, made):
         steps.slope()
         assert steps.drop_what_is_not_finite() == 1
@@ -113,20 +104,20 @@ def outgrown(make):
 def test_what_cannot_be_recorded_is_done_as_usual(monkeypatch):
     """At first, and where there is room for more no longer."""
 
-    class Refused(Repeated):
-        left = 0
+    left = iter(range(0))
 
-        def _graph_of(self, work):
-            if not Refused.left:
-                raise RuntimeError("not permitted\nwhile recording")
-            Refused.left -= 1
-            return super()._graph_of(work)
+    def refused(work):
+        if next(left, None) is None:
+            raise RuntimeError("not permitted\nwhile recording")
+        return repeated(work)
 
+    monkeypatch.setattr(recorded, "_graph_of", refused)
     monkeypatch.setattr(recorded, "ROOMY", 1.0)
     monkeypatch.setattr(recorded, "SPARE", 0)
-    for Refused.left in (0, 2):
+    for count in (0, 2):
+        left = iter(range(count))
         with pytest.warns(RuntimeWarning, match=r"can't be recorded.*\(not permitted\)$"):
-            made, scene, value = outgrown(Refused)
+            made, scene, value = outgrown(Recorded)
         plain, other = begun(Plain, radius=0.6)
         assert value == pytest.approx(plain.slope(), rel=1e-5)
         assert made.drop_what_is_not_finite() == 0

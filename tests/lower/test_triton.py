@@ -10,20 +10,12 @@ from sdf2vec.graph import scalarize
 from sdf2vec.lower import triton as triton_lowering
 from sdf2vec.lower.block import Block
 from tests.operations import MEANINGS, expected
-from tests.triton_device import DEVICE
+from tests.triton_device import DEVICE, MARKS
 
-pytestmark = [
-    pytest.mark.filterwarnings("ignore::RuntimeWarning:triton"),  # the interpreter's 0.5 / 0, not selected
-    pytest.mark.usefixtures("triton"),
-]
+pytestmark = MARKS
 
 ARGUMENTS = [var(name) for name in ("x0", "x1", "x2", "x3", "x4")]
 SIZE = 256
-
-
-@pytest.fixture
-def triton(require_engine):
-    require_engine("triton")
 
 
 def operation_text(name, meaning):

@@ -17,17 +17,9 @@ from sdf2vec.render import fused, triton_fused, triton_kernels
 from sdf2vec.render.tensors import from_scene
 from tests.render.agreement import assert_near_the_reference, outcome
 from tests.scenes import FAMILIES, scene_of
-from tests.triton_device import DEVICE
+from tests.triton_device import DEVICE, MARKS
 
-pytestmark = [
-    pytest.mark.filterwarnings("ignore::RuntimeWarning:triton"),  # the interpreter's 0.5 / 0, not selected
-    pytest.mark.usefixtures("triton"),
-]
-
-
-@pytest.fixture
-def triton(require_engine):
-    require_engine("triton")
+pytestmark = MARKS
 
 
 # --- whole scenes ------------------------------------------------------------------------------------------
@@ -114,7 +106,23 @@ def test_room_for_more_pairs_than_there_are_changes_nothing():
     assert 6 <= int(room.needed) < 1000
 
 
-def test_room_for_fewer_pairs_than_there_are_is_kept_and_said():
+def test_room_for_fewer_pairs_than_there_are_is_kept_and_said(monkeypatch):
+    """What lies behind it in memory stays as it is."""
+    launch, behind = triton_fused._launch, []
+
+    def in_larger_memory(kernel, programs, *arguments):
+        if kernel.__name__ != "find_pairs":
+            launch(kernel, programs, *arguments)
+            return
+        *others, most = arguments
+        given = others[-3:]
+        larger = [torch.cat([each, each.new_full((200,), -7)]) for each in given]
+        launch(kernel, programs, *others[:-3], *larger, most)
+        for each, own in zip(given, larger, strict=True):
+            each.copy_(own[:most])
+            behind.append(own[most:])
+
+    monkeypatch.setattr(triton_fused, "_launch", in_larger_memory)
     scene = scene_of("plain", layers=6, seed=6)
     rooms = [triton_fused.Room(pairs) for pairs in (1000, 3, 0)]
     for room in rooms:
@@ -122,6 +130,8 @@ def test_room_for_fewer_pairs_than_there_are_is_kept_and_said():
     needed = [room.needed for room in rooms if room.needed is not None]
     assert needed[0] > 3
     assert needed == [needed[0]] * 3
+    assert len(behind) == 9
+    assert all((each == -7).all() for each in behind)
 
 
 @pytest.mark.parametrize(
