@@ -15,7 +15,7 @@ ENDS = 2.0  # pixels at the ends of a side, where corners are rounded off by pix
 STUB = 4.0  # pixels of a side that is none
 MOVED = 6.0  # pixels from a corner of an outline to where its sides meet, at most
 MOST = 14  # corners: of a region with more most are no corners
-WIDEST = 0.98  # cosine of the angle between sides that go on in each other
+LEAST_TURN = 0.2  # sine of the angle between sides that don't go on in each other
 
 
 def corners(inside: Float64Array, known: Float64Array) -> Float64Array:
@@ -74,11 +74,15 @@ def _side(points: Float64Array, start: Float64Array, end: Float64Array) -> Side:
 def _meeting(corner: Float64Array, before: Side, after: Side) -> Float64Array:
     """Where two sides meet, if that is near a corner of the outline; else that."""
     (p, along), (q, onward) = before, after
-    if abs(float(along @ onward)) > WIDEST:
+    turn = _cross(along, onward)
+    if abs(turn) < LEAST_TURN:  # a side without length has no direction, and turns nowhere
         return corner
-    share = np.linalg.solve(np.stack([along, -onward], axis=1), q - p)[0]
-    met = p + share * along
+    met = p + _cross(q - p, onward) / turn * along
     return met if np.linalg.norm(met - corner) < MOVED else corner
+
+
+def _cross(a: Float64Array, b: Float64Array) -> float:
+    return float(a[0] * b[1] - a[1] * b[0])
 
 
 def triangles(

@@ -62,3 +62,12 @@ def test_the_triangle_that_covers_most_comes_first_and_none_that_covers_what_is_
         across = (corner[1] - corner[0]), (corner[2] - corner[0])
         area = abs(across[0][0] * across[1][1] - across[0][1] * across[1][0]) / 2
         assert area <= coverage.sum()
+
+
+@pytest.mark.parametrize("size", [(1, 1), (1, 2), (2, 1), (1, 4), (2, 2), (3, 3)])
+def test_a_speck_is_nothing_to_stumble_over(size):
+    speck = np.zeros((80, 90))
+    speck[40 : 40 + size[0], 30 : 30 + size[1]] = 1.0
+    found = corners(speck, EVERYWHERE)
+    assert np.all(np.isfinite(found))
+    assert np.all(np.abs(found - (30, 40)) < 6)
