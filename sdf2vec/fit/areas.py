@@ -18,8 +18,9 @@ from ..layer import LOOK, Slot, row_width
 from ..paints import FLAT
 from ..render.reference import rows_coverage
 from ..render.tensors import Group
-from .arcs import Arc
+from .arcs import Arc, arcs
 from .candidates import Mask, Opening, Proposer, own_cover
+from .corners import corners
 from .covering import TRIANGLE, parted, with_triangle
 from .initialization import straight
 from .surroundings import Surroundings
@@ -28,6 +29,7 @@ from .windows import Part
 
 EXACT = 0.36  # pixels by which an outline is off in the mean, at most
 LEAST_OFF = 0.15  # below that an outline is no better
+GROSSLY = 0.01  # share of it that may be wrong in finer surroundings, by more than an edge
 GOOD = 0.25  # share of a layer that its shape may miss, at most
 BITTEN = 0.05  # share of what is cut out of a shape that is beyond its edge: a bite, no hole
 PRICE = 0.04  # of a number, in logarithms of what is missed
@@ -160,7 +162,7 @@ class Area:
 
     def all_outlined(self, layers: Sequence[Group]) -> list[Outlined]:
         """The same of some layers of one structure, each alone."""
-        wrong = (self._covers(layers) * self.known - self.inside).abs().sum(1)
+        wrong = (_covers(layers, self.around) * self.known - self.inside).abs().sum(1)
         return [
             self._judged(layer, off, self._is_bitten(layer))
             for layer, off in zip(layers, wrong.tolist(), strict=True)
@@ -175,11 +177,12 @@ class Area:
         """In pixels."""
         return max(float(self.inside.sum()), TINY)
 
-    def gross(self, layers: Sequence[Group], pixels: int) -> float:
-        """The share of it that layers cover wrongly in squares of so many pixels: elsewhere their edge is off."""
+    def is_told_as_in(self, coarse: Area, layers: Sequence[Group]) -> bool:
+        """Whether layers that have its outline in coarser surroundings miss nothing of it here but at their edge."""
+        pixels = max(round(EXACT * float(coarse.around.points[2] / self.around.points[2])) + 1, 2)
         wrong = self.around.plane((self.cover(layers) * self.known - self.inside).abs() > 0.5)
         squares = ndimage.binary_opening(wrong, np.ones((pixels, pixels)))
-        return float(squares.sum()) / self._size
+        return float(squares.sum()) < GROSSLY * self._size
 
     def _is_bitten(self, layer: Group) -> bool:
         """Whether a shape that is cut out of the first goes beyond its edge, or one that leaves a part of it does."""
@@ -195,15 +198,23 @@ class Area:
 
     def cover(self, layers: Sequence[Group]) -> torch.Tensor:
         """Coverage [P] of layers that lie on each other, without their opacity."""
-        left = torch.ones_like(self.inside)
-        for layer in layers:
-            left = left * (1.0 - self._covers([layer])[0])
-        return 1.0 - left
+        return cover_at(layers, self.around)
 
-    def _covers(self, layers: Sequence[Group]) -> torch.Tensor:
-        """The same [G, P] of layers of one structure."""
-        rows, compositing = torch.cat([layer.rows() for layer in layers]), self.around.scene.compositing
-        return rows_coverage(layers[0].structure, rows[..., None], compositing, *self.around.points)[0]
+    def corners(self) -> torch.Tensor:
+        """Those of its outline, (x, y) [N, 2] in scene units."""
+        found = corners(self.around.plane(self.inside), self.around.plane(self.known))
+        return self.around.places(torch.from_numpy(found).float())
+
+    def arcs(self, fine: Area) -> list[Arc]:
+        """Those of its outline, in its own pixels, as they are in finer surroundings."""
+        ratio = float(fine.around.points[2] / self.around.points[2])
+        found = arcs(fine.around.plane(fine.inside), fine.around.plane(fine.known))
+        middles = torch.tensor([[arc.x, arc.y] for arc in found]).reshape(-1, 2)
+        moved = self.around.pixels(fine.around.places(middles)).tolist()
+        return [
+            arc._replace(x=x, y=y, radius=arc.radius * ratio)
+            for arc, (x, y) in zip(found, moved, strict=True)
+        ]
 
     def hull(self) -> torch.Tensor:
         """Where it may be if it is convex: others may hide parts of it, [P]."""
@@ -254,3 +265,17 @@ class Area:
         """A place for a shape of which only what it has in common with one that covers too much is left."""
         matters = self.known * self.cover([base])
         return Opening(base, len(base.structure), INTERSECTION, self.color, Mask(matters, self.inside, 0.0))
+
+
+def cover_at(layers: Sequence[Group], around: Surroundings) -> torch.Tensor:
+    """Coverage [P] of layers that lie on each other, without their opacity, at the points of some surroundings."""
+    left = torch.ones_like(around.points[0])
+    for layer in layers:
+        left = left * (1.0 - _covers([layer], around)[0])
+    return 1.0 - left
+
+
+def _covers(layers: Sequence[Group], around: Surroundings) -> torch.Tensor:
+    """The same [G, P] of layers of one structure, each alone."""
+    rows, compositing = torch.cat([layer.rows() for layer in layers]), around.scene.compositing
+    return rows_coverage(layers[0].structure, rows[..., None], compositing, *around.points)[0]

@@ -8,7 +8,6 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
-from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
@@ -23,7 +22,7 @@ from ..render.tensors import Group
 from ..shapes import KINDS
 from ..units import Placed
 from .candidates import Mask, Opening, Proposer, joined_sharply, own_cover, single
-from .corners import corners, triangles
+from .corners import triangles
 from .surroundings import Surroundings
 
 DIRECTIONS = 24  # of bars, in half a turn
@@ -59,7 +58,8 @@ class Covering:
     looks: Group
     around: Surroundings
     proposer: Proposer
-    has_corners: bool = False  # whether triangles between corners of its outline are laid, no bars
+    # of its outline, (x, y) [N, 2] in scene units, between which triangles are laid; where it is none, bars are
+    corners: torch.Tensor | None = None
 
     def layers(self) -> Iterator[Group]:
         """Layers of two, three and more shapes joined sharply, which cover ever more; none once that gets hopeless."""
@@ -84,12 +84,12 @@ class Covering:
         index = len(layer.structure)
         mask = Mask(left + STRICT * too_much, left, 0.0)
         place = Opening(layer, index, UNION if index else "", self.color, mask)
-        lay_out = self._triangles if self.has_corners else self._along_bar
+        lay_out = self._along_bar if self.corners is None else self._triangles
         best, most = layer, 0.0
         for made in lay_out(place, left, too_much):
             cover = own_cover(made, index, self.around)
             gain = float((cover * (left - STRICT * too_much)).sum())
-            gain *= 1.0 if self.has_corners else SIMPLE.get(made.structure[index].kind, OTHER)
+            gain *= 1.0 if self.corners is not None else SIMPLE.get(made.structure[index].kind, OTHER)
             if gain > most:
                 best, most = made, gain
         return joined_sharply(best) if most else None
@@ -108,15 +108,11 @@ class Covering:
 
     def _triangles(self, place: Opening, left: torch.Tensor, too_much: torch.Tensor) -> list[Group]:
         """The layer with triangles between corners of the outline that cover most of what is left [P]."""
-        if TRIANGLE not in self.proposer.kinds:
+        if TRIANGLE not in self.proposer.kinds or self.corners is None:
             return []
+        points = self.around.pixels(self.corners).numpy().astype(np.float64)
         planes = self.around.plane(left), self.around.plane(STRICT * too_much)
-        return [with_triangle(place, ends, self.around) for ends in triangles(self._corners, *planes, STARTS)]
-
-    @cached_property
-    def _corners(self) -> Float64Array:
-        """Of its outline, [N, 2] in pixels."""
-        return corners(self.around.plane(self.inside), self.around.plane(self.known))
+        return [with_triangle(place, ends, self.around) for ends in triangles(points, *planes, STARTS)]
 
     def _placed(self, bar: Bar) -> Placed:
         """Where shapes start that are to be where a bar is."""

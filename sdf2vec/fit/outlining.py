@@ -11,7 +11,7 @@ import torch
 
 from ..layer import Structure
 from ..render.tensors import Group
-from .arcs import Arc, arcs
+from .arcs import Arc
 from .areas import CIRCLE, EXACT, LEAST_OFF, Area, Outlined
 from .candidates import Opening, Proposer, joined_sharply, reductions
 from .covering import Covering
@@ -39,9 +39,16 @@ def best_outlined(area: Area, fine: Area, search: Search) -> Outlined | None:
     if not plain:
         return None
     ranked = _sharpest(plain, area, proposer)
+
+    def finely(each: Outlined) -> float:
+        return each.priced(FINELY_OFF, DEAR)
+
     good = _distinct([each for each in ranked if each.is_good])[:LIKELY]
     if good:
-        return _finest(good, area, fine, proposer, lambda each: each.priced(FINELY_OFF, DEAR))
+        good = [_finest(good, area, fine, proposer, finely)]
+        if area.overlay.opacity == 1.0 and fine.outlined(good[0].layer).off > EXACT:
+            good += _narrowed(good[0].layer, area, proposer)
+        return _finest(good, area, fine, proposer, finely) if len(good) > 1 else good[0]
     best = ranked[0]
     wide = sorted(_single(area, area.opening(EAGER), proposer), key=lambda each: _eager(each, area))
     cut = [
@@ -58,10 +65,17 @@ def best_outlined(area: Area, fine: Area, search: Search) -> Outlined | None:
         drawn = area.outlined_together(layers)
         if drawn.off < TOGETHER:
             return drawn
-    round_ones = _on_circles(area, proposer)
+    round_ones = _on_circles(area, fine, proposer)
     if round_ones and min(each.score for each in round_ones) < best.score:
         return _finest(round_ones, area, fine, proposer, lambda each: each.priced(LEAST_OFF, CHEAP))
     return best if best.off < TOGETHER else _together(area, fine, proposer) or best
+
+
+def _narrowed(base: Group, area: Area, proposer: Proposer) -> list[Outlined]:
+    """What another shape leaves of one that nearly has the outline: of a bar with round ends a circle does."""
+    (made,) = proposer.candidates([area.meeting(base)], area.around)
+    found = _sharpest([area.outlined(joined_sharply(each.layer)) for each in made], area, proposer)
+    return _distinct([each for each in found if each.off < TOGETHER])[:LIKELY]
 
 
 def _finest(
@@ -77,13 +91,13 @@ def _finest(
     return area.outlined(min(exact, key=lambda layer: rank(fine.outlined(layer))))
 
 
-def _on_circles(area: Area, proposer: Proposer) -> list[Outlined]:
+def _on_circles(area: Area, fine: Area, proposer: Proposer) -> list[Outlined]:
     """What is left of circles that the outline runs along, where others are cut out of them and a shape leaves or takes
     away a part: sectors, bows. None but those that have the very outline.
     """
     if CIRCLE not in proposer.kinds:
         return []
-    found = arcs(area.around.plane(area.inside), area.around.plane(area.known))
+    found = area.arcs(fine)
     outer, inner = ([arc for arc in found if arc.is_outer == side][:ON_CIRCLES] for side in (True, False))
     tried: list[Outlined] = []
     for arc in outer:
@@ -108,29 +122,35 @@ def _together(area: Area, fine: Area, proposer: Proposer) -> Outlined | None:
     """Several shapes that have the very outline together, laid out from bars, or also from triangles between corners;
     None if none have: what they miss would take many more.
     """
-    barred = _covered(area, proposer, has_corners=False)
+    barred = _covered(area, fine, proposer, None)
     if barred is not None:
         barred = _finest([barred], area, fine, proposer, lambda each: each.score)
         if fine.outlined(barred.layer).off < EXACT:
             return barred
-    found = [each for each in (barred, _covered(area, proposer, has_corners=True)) if each is not None]
-    return _finest(found, area, fine, proposer, lambda each: each.score) if found else None
+    found = [barred, *(_covered(area, fine, proposer, each.corners()) for each in _different(area, fine))]
+    good = [each for each in found if each is not None]
+    return _finest(good, area, fine, proposer, lambda each: each.score) if good else None
 
 
-def _covered(area: Area, proposer: Proposer, has_corners: bool) -> Outlined | None:
-    """The same in one of the two ways."""
+def _different(area: Area, fine: Area) -> list[Area]:
+    """An area, and the same in finer surroundings if there are any."""
+    return [area] if area is fine else [area, fine]
+
+
+def _covered(area: Area, fine: Area, proposer: Proposer, corners: torch.Tensor | None) -> Outlined | None:
+    """The same in one of the two ways; of few shapes those that miss nothing in the finest surroundings, either."""
     place = area.opening()
 
     def sharp(layer: Group) -> Outlined:
         moved = proposer.sharpened(layer, place.mask, area.around, STEPS)
         return area.outlined(joined_sharply(moved))
 
-    region = Covering(area.inside, area.known, place.color, place.layer, area.around, proposer, has_corners)
+    region = Covering(area.inside, area.known, place.color, place.layer, area.around, proposer, corners)
     for layer in region.layers():
         found = [sharp(layer)]
         if found[0].off < EXACT:  # what was laid first may be needless, or keep the others from their places
             found += map(sharp, reductions(found[0].layer))
-        good = [each for each in found if each.off < TOGETHER]
+        good = [each for each in found if each.off < TOGETHER and fine.is_told_as_in(area, [each.layer])]
         if good:
             return min(good, key=lambda each: (len(each.layer.structure), each.off))
     return None

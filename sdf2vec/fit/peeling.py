@@ -17,7 +17,7 @@ from scipy import ndimage
 from ..arrays import BoolArray
 from ..blend import INTERSECTION
 from ..render.tensors import Group, SceneTensors
-from .areas import EXACT, Area, Outlined
+from .areas import Area, Outlined, cover_at
 from .candidates import own_cover
 from .joining import Search, inserted
 from .outlining import best_outlined
@@ -32,7 +32,6 @@ FAILED, FORGIVEN = 64, 0.5
 KNOWN = 0.5  # share of it that is flat regions, for any to be
 POINTS = 4000  # at most, at which an outline is looked for
 MARGIN = 0.2, 4  # around a region: share of its longer side, and pixels
-GROSSLY = 0.01  # share of it that may be wrong where the largest surroundings show it, by more than an edge
 MOSTLY = 0.5  # share of an edge beyond a shape
 HIDDEN = 0.5  # share of another region, at most, that a layer on top covers
 
@@ -100,11 +99,34 @@ class Outlines:
         for overlay in tried:
             if self.are_hopeless:
                 break
-            area, fine = self._areas(overlay, regions)
-            best = self._of(area, fine)
-            if best is not None and best.is_good and _holds(best, area, fine, regions):
-                found.append(replace(best, overlay=overlay))
+            own = regions.extent(overlay.inside)
+            best = self._within(own, overlay, regions)
+            if best is not None and self._hides_more(best, regions):  # than is seen around its own place
+                best = self._within(self._everywhere, overlay, regions)
+            if best is not None and not self._hides_more(best, regions):
+                found.append(best)
         return found
+
+    def _within(self, part: Part, overlay: Overlay, regions: Regions) -> Outlined | None:
+        """What has the outline of an overlay, as seen in a part of the picture and around it."""
+        area, fine = self._areas(part, overlay, regions)
+        best = self._of(area, fine)
+        is_ground = _of_color(regions, self.scene.background.numpy())
+        if best is None or not best.is_good or not _holds(best, area, fine, regions, is_ground):
+            return None
+        return replace(best, overlay=overlay)
+
+    def _hides_more(self, best: Outlined, regions: Regions) -> bool:
+        """Whether layers cover the greater part of a region that they do not belong to."""
+        whole = self.around[-1]
+        covered = whole.plane(cover_at(best.all, whole) > 0.5)
+        hidden = np.bincount(regions.labels[covered], minlength=len(regions.areas) + 1)[1:]
+        return bool(((hidden > HIDDEN * regions.areas) & ~best.overlay.inside).any())
+
+    @property
+    def _everywhere(self) -> Part:
+        height, width = self.around[-1].shape
+        return slice(0, height), slice(0, width)
 
     def _of(self, area: Area, fine: Area) -> Outlined | None:
         """The shape that comes nearest to an overlay, or a shape with another cut out of it; None for no pixel."""
@@ -113,11 +135,11 @@ class Outlines:
             self.done[key] = best_outlined(area, fine, self.search)
         return self.done[key]
 
-    def _areas(self, overlay: Overlay, regions: Regions) -> tuple[Area, Area]:
-        """Where an overlay is, in a window of the largest surroundings in which that has at most `POINTS` points, and
-        in one of the finest.
+    def _areas(self, own: Part, overlay: Overlay, regions: Regions) -> tuple[Area, Area]:
+        """Where an overlay is, in a window around a part of the largest surroundings in which that has at most `POINTS`
+        points, and in one of the finest.
         """
-        sides, own = regions.sides, regions.extent(overlay.inside)
+        sides = regions.sides
         soft = _is_soft(overlay.inside, widened(own, 2, sides), regions)
         windows = [_with_margin(smaller(own, sides, around.shape), around.shape) for around in self.around]
         near = max((i for i, window in enumerate(windows) if _points(window) <= POINTS), default=0)
@@ -149,16 +171,11 @@ def _apart(ranked: Sequence[Outlined], regions: Regions) -> list[Outlined]:
     return taken
 
 
-def _holds(best: Outlined, area: Area, fine: Area, regions: Regions) -> bool:
-    """Whether layers cover their overlay in the finest surroundings as well as where found, and nothing else."""
-    pixels = EXACT * float(area.around.points[2] / fine.around.points[2])
-    if fine.gross(best.all, max(round(pixels) + 1, 2)) >= GROSSLY:
+def _holds(best: Outlined, area: Area, fine: Area, regions: Regions, is_ground: BoolArray) -> bool:
+    """Whether layers cover their overlay in the finest surroundings as well as where found, with edges of their own."""
+    if not fine.is_told_as_in(area, best.all):
         return False
-    if any(_goes_on(layer, fine, regions) for layer in best.all if _is_met(layer)):
-        return False
-    covered = fine.around.plane(fine.cover(best.all) > 0.5)
-    hidden = np.bincount(regions.labels[fine.part][covered], minlength=len(regions.areas) + 1)[1:]
-    return not ((hidden > HIDDEN * regions.areas) & ~fine.overlay.inside).any()
+    return not any(_goes_on(layer, fine, regions, is_ground) for layer in best.all if _is_met(layer))
 
 
 def _is_met(layer: Group) -> bool:
@@ -166,16 +183,19 @@ def _is_met(layer: Group) -> bool:
     return INTERSECTION in [part.join for part in layer.structure]
 
 
-def _goes_on(layer: Group, fine: Area, regions: Regions) -> bool:
+def _goes_on(layer: Group, fine: Area, regions: Regions, is_ground: BoolArray) -> bool:
     """Whether edges that cut a part out of a layer's first shape go on beyond it, between regions: then they are those
-    of a shape that lies on it, or under it.
+    of a shape that lies on it, or under it. Not where all that they cut off is ground [R]: many shapes may end there.
     """
     labels, around = regions.labels[fine.part], fine.around
+    ground = np.concatenate([[False], is_ground])[labels]
     base, *others = (
         around.plane(own_cover(layer, index, around) > 0.5) for index in range(len(layer.structure))
     )
     edge = seen = 0
     for other in others:
+        if ground[base & ~other].sum() > MOSTLY * (base & ~other).sum():
+            continue
         for one, next_one in ((np.s_[1:], np.s_[:-1]), (np.s_[:, 1:], np.s_[:, :-1])):
             beyond = (other[one] != other[next_one]) & ~base[one] & ~base[next_one]
             edge += int(beyond.sum())
@@ -188,8 +208,7 @@ def opaque(regions: Regions, ground: np.ndarray, whole: bool) -> Iterator[Overla
     of one colour, and connected but for what is not known.
     """
     colors, doubts = regions.colors, regions.doubts
-    count, channels = colors.shape
-    is_ground = (np.abs(colors - ground[:channels]) <= 2 * doubts[:, None]).all(axis=1)
+    count, is_ground = len(colors), _of_color(regions, ground)
     apart = np.abs(colors[:, None] - colors[None]).max(axis=2, initial=0.0)
     alike = (apart <= doubts[:, None] + doubts[None]) & ~is_ground
     done = is_ground.copy()
@@ -198,6 +217,12 @@ def opaque(regions: Regions, ground: np.ndarray, whole: bool) -> Iterator[Overla
             inside = _linked(number, alike[number], regions) if whole else np.arange(count) == number
             done |= inside
             yield Overlay(1.0, colors[number], inside, ~inside)
+
+
+def _of_color(regions: Regions, color: np.ndarray) -> BoolArray:
+    """Which regions [R] have about a colour [C]."""
+    apart = np.abs(regions.colors - color[: regions.colors.shape[1]])
+    return np.asarray((apart <= 2 * regions.doubts[:, None]).all(axis=1))
 
 
 def _linked(number: int, alike: BoolArray, regions: Regions) -> BoolArray:

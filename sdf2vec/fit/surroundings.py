@@ -120,6 +120,11 @@ class Surroundings:
         x, y, pixel = self.points
         return pixels * pixel + torch.stack([x[0], y[0]])
 
+    def pixels(self, places: torch.Tensor) -> torch.Tensor:
+        """Points (x, y) [N, 2] in pixels of some in scene units."""
+        x, y, pixel = self.points
+        return (places - torch.stack([x[0], y[0]])) / pixel
+
     def window(self, rows: slice, columns: slice) -> Surroundings:
         """A part of them."""
         height, width = self.shape

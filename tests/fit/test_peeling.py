@@ -33,6 +33,7 @@ from tests.fit.drawn import (
     painted,
     points,
     search_of,
+    sharp_box,
     sharp_disc,
     sharp_triangle,
     view_of,
@@ -261,10 +262,10 @@ def goes_on(pixels, color, *shapes):
     )
     inside = np.abs(regions.colors - color).max(axis=1) < 0.02
     outlines = peeling.Outlines(bare, [Surroundings.of(bare, 0, view_of(pixels))], search_of())
-    _, fine = outlines._areas(Overlay(1.0, color, inside, ~inside), regions)
+    _, fine = outlines._areas(regions.extent(inside), Overlay(1.0, color, inside, ~inside), regions)
     layer = Layer(shapes, joints=(Joint("intersection"),))
     (group,) = from_scene(Scene(SIDE, SIDE, (layer,), (1.0, 1.0, 1.0))).groups
-    return peeling._goes_on(group, fine, regions)
+    return peeling._goes_on(group, fine, regions, np.abs(regions.colors - WHITE).max(axis=1) < 0.02)
 
 
 def test_where_two_shapes_overlap_edges_go_on_and_at_a_slice_of_a_pie_they_do_not():
@@ -275,6 +276,26 @@ def test_where_two_shapes_overlap_edges_go_on_and_at_a_slice_of_a_pie_they_do_no
     pie = painted((disc(48, 48, 40), BLUE, 1.0), (sector(0, 90, 40), GREEN, 1.0))
     slice_of = sharp_triangle(GREEN, (48, 48), (144, 48), (48, 144)).shapes[0]
     assert not goes_on(pie, GREEN, sharp_disc(GREEN, 48, 48, 40).shapes[0], slice_of)
+
+
+def test_edges_at_which_many_shapes_end_may_go_on():
+    """A bar that goes across a disc ends where the disc does."""
+    mask = disc(48, 48, 40)
+    striped = painted((mask, BLUE, 1.0), (mask & box(36, 0, 60, 96), GREEN, 1.0))
+    shapes = (sharp_box(GREEN, 36, 0, 60, 96).shapes[0], sharp_disc(GREEN, 48, 48, 40).shapes[0])
+    assert not goes_on(striped, GREEN, *shapes)
+
+
+def test_a_flag_in_a_disc_is_its_fields_cut_by_the_disc():
+    """The bar across it looks like a box where it is small; each field beside it like a whole disc."""
+    mask = disc(48, 48, 40)
+    pixels = painted(
+        (mask, BLUE, 1.0), (mask & box(0, 0, 36, 96), GREEN, 1.0), (mask & box(36, 0, 60, 96), RED, 1.0)
+    )
+    layers = apart(pixels)
+    assert len(layers) == 3
+    scene = Scene(SIDE, SIDE, tuple(layers), (1.0, 1.0, 1.0))
+    assert -10 * np.log10(np.mean((render(scene) - pixels) ** 2)) > 28
 
 
 def test_what_has_corners_is_triangles_between_them():
