@@ -233,7 +233,7 @@ class Exports:
     ) -> Exported:
         made = draw(self._drawn(scene, grain), options, grain)
         blurs = ", layers blurred together" if grain.runs else ""
-        units = grain.for_layers(len(scene.layers)).units
+        units = grain.for_scene(scene).units
         note = f"drawn small: {units} steps along the shortest side, {grain.colors} of a colour{blurs}"
         return replace(made, notes=(note, *made.notes))
 

@@ -9,6 +9,7 @@ from .blend import OVER
 from .scene import Scene
 
 FEW, SPARSE, MANY = 32, 64, 128  # layers
+FINER = 0.1  # share by which units may be more or less
 
 
 class Grain(NamedTuple):
@@ -29,18 +30,37 @@ class Grain(NamedTuple):
     runs: int = 0
     shrink: float = 0.0
 
-    def for_layers(self, count: int) -> Grain:
-        """For a drawing of so many layers."""
+    def for_scene(self, scene: Scene) -> Grain:
+        """For a drawing of as many layers as a scene has, on a canvas as large as its."""
+        count = len(scene.layers)
         share = math.sqrt(min(1.0, max(count, 1) / MANY))
         softnesses = min(self.softnesses, max(self.fewest, round(self.softnesses * share)))
         runs = self.runs if count >= MANY else min(self.runs, 1)
-        units = round(self.units * max(1.0, count / SPARSE) ** self.shrink)
+        about = round(self.units * max(1.0, count / SPARSE) ** self.shrink)
+        units = _in_proportion(about, scene.width, scene.height)
         return self._replace(units=units, softnesses=softnesses, filter=self.filter / share, runs=runs)
 
     @property
     def name(self) -> str:
         """What it is called in tables: by its grid for few layers, `runs` before that of one with runs."""
         return f"{'runs' if self.runs else 'small'} {self.units}"
+
+
+def _in_proportion(about: int, width: int, height: int) -> int:
+    """About so many units along the shortest side that the other has a whole number of them, too.
+
+    resvg, and programs with it, round the sides of an SVG to whole units and its height on screen up, so that a picture
+    drawn by its width gets a row too many. If there are none such near, then those by which it gets none.
+    """
+    short, long = sorted((width, height))
+    least = short // math.gcd(short, long)
+    whole = max(1, round(about / least)) * least
+    if abs(whole - about) <= FINER * about:
+        return whole
+    near = sorted(
+        range(math.ceil((1 - FINER) * about), int((1 + FINER) * about) + 1), key=lambda n: abs(n - about)
+    )
+    return next((units for units in near if (units * long / short % 1.0 >= 0.5) == (width > height)), about)
 
 
 GRAINS = (  # finest first

@@ -98,7 +98,7 @@ def _begun(tensors: SceneTensors, scene: Scene, grain: Grain) -> tuple[Softening
     now on, in place, or none.
     """
     softening, count = None, tensors.layer_count
-    grain = grain.for_layers(count)
+    grain = grain.for_scene(scene)
     if grain.runs and any(_softest(group) > HARDLY * scene.pixel for group in tensors.groups):
         softening = Softening.of(tensors, scene.pixel, grain.runs)
         for group in tensors.groups:

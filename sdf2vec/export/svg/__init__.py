@@ -146,7 +146,7 @@ def _text(planner: Planner, detail: Detail, options: Options) -> str:
 
 
 def _small(scene: Scene, grain: Grain) -> Style:
-    return Style(named=False, compact=True, filter=grain.for_layers(len(scene.layers)).filter)
+    return Style(named=False, compact=True, filter=grain.for_scene(scene).filter)
 
 
 def _written(drawing: Drawing, options: Options, style: Style) -> str:

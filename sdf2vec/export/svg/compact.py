@@ -59,7 +59,7 @@ def sketched(drawable: Drawable, grain: Grain) -> Drawing:
 
 
 def _canvas(scene: Scene, grain: Grain) -> Canvas:
-    return Canvas.whole(scene, grain.for_layers(len(scene.layers)).units)
+    return Canvas.whole(scene, grain.for_scene(scene).units)
 
 
 def _drawing(
