@@ -25,7 +25,7 @@ from ..scene import Scene
 from ..threads import threads_of_its_own
 from .backends import CPU, choose
 from .byte_budget import Share, within
-from .descents import Sizes, descended, finished, sharper, softer
+from .descents import Sizes, descended, fine_enough, finished, sharper, softer
 from .description import description_length
 from .digits import concise, fit_concisely
 from .drawings import Drawn, is_photograph
@@ -288,6 +288,7 @@ class Drawing:
             self.scene = grounded(self.scene, self.sizes.joint, self.search)
             if not self.scene.groups:
                 self.scene = taken_apart(self.scene, self.sizes, self.search, self.settings.most)
+                self.sizes, self.search = fine_enough(self.sizes, self.search, self.scene)
             outlined, helped = self.scene.layer_count, []
             rounds = grow(self.scene, self.sizes, self.search, self.settings.most, self.floor)
             for made in rounds:

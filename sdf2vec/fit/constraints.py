@@ -16,7 +16,7 @@ from ..lower.numpy import Arrays, compile_numpy
 from ..lower.torch import Tensors, compile_torch
 from ..render.tensors import Group, SceneTensors
 from ..shapes import KINDS
-from ..units import BACKGROUND, LONGEST, Room
+from ..units import BACKGROUND, LENGTH, LONGEST, Room
 
 ALMOST = 0.999  # of the most that a number may be: there it still changes something
 NEWTON_STEPS = 6  # towards the least thickness, at most
@@ -38,6 +38,17 @@ def project(tensors: SceneTensors, pixel: float, falloff: tuple[float, float] = 
 def room_of(tensors: SceneTensors, pixel: float, falloff: tuple[float, float]) -> Room:
     """What the ranges of a scene's numbers depend on."""
     return Room(tensors.size, pixel, falloff, COMPOSITING[tensors.compositing].signed)
+
+
+def least_length(tensors: SceneTensors, pixel: float) -> float:
+    """The least that lengths of a scene may be, in scene units: a pixel, or half of what it has less of."""
+    lengths = [
+        float(values.min())
+        for group in tensors.groups
+        for slot, values in group.values.items()
+        if len(group) and slot.parameter.unit is LENGTH and slot.parameter.positive
+    ]
+    return min([pixel, *(0.5 * length for length in lengths if length < pixel)])
 
 
 def project_group(group: Group, room: Room) -> None:

@@ -21,7 +21,7 @@ from ..threads import threads_of_its_own
 from .adam import Adam, adam_over
 from .backends import Backend, choose
 from .best import Best, faded, mean_color, nearest_of_its_own
-from .constraints import enforce_min_thickness, project, too_small
+from .constraints import enforce_min_thickness, least_length, project, too_small
 from .growth import add, anywhere, densify, exchange, idle, importance, prune, relocate
 from .initialization import Layers, background_of, empty_groups, place, tell_apart
 from .joining import RESOLUTIONS as JOIN_RESOLUTIONS
@@ -113,8 +113,8 @@ class Fit:
         self.generator = torch.Generator().manual_seed(settings.seed)
         self.pixels = picture.premultiplied
         self.sides = (picture.width, picture.height)
-        self.pixel = 1.0 / min(self.sides)
-        self.size = (picture.width * self.pixel, picture.height * self.pixel)
+        pixel = 1.0 / min(self.sides)
+        self.size = (picture.width * pixel, picture.height * pixel)
         self.wanted = settings.most // settings.union  # layers
         self.starts = 1 if settings.start is not None else self.preset.starts(self.wanted)
         self.done, self.steps, self.stopped = 0, self._count_steps(), False
@@ -127,7 +127,9 @@ class Fit:
         self._announce_compiling()
 
     def _begin(self) -> None:
-        self.tensors = on_device(self._start(), self.backend.device)
+        start = self._start()
+        self.tensors = on_device(start, self.backend.device)
+        self.pixel = least_length(start, 1.0 / min(self.sides))
         self.optimizer, self.steady = self._adam(), Steady()
         self.taken: Steps | None = None  # how steps are, as long as the layers are the same
 
@@ -313,11 +315,7 @@ class Fit:
             self._report(phase, loss)
 
     def _step(
-        self,
-        stage: Stage,
-        rate: float,
-        moves: Callable[[Group], torch.Tensor] | None,
-        best: Best | None,
+        self, stage: Stage, rate: float, moves: Callable[[Group], torch.Tensor] | None, best: Best | None
     ) -> float:
         taken = self.taken = self.taken or self._steps(stage)
         loss = taken.slope()

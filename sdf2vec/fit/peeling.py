@@ -19,6 +19,7 @@ from ..blend import INTERSECTION
 from ..render.tensors import Group, SceneTensors
 from .areas import Area, Outlined, cover_at
 from .candidates import own_cover
+from .hairlines import hairlines
 from .joining import Search, inserted
 from .outlining import best_outlined
 from .region_graph import Regions
@@ -49,7 +50,9 @@ def peeled(scene: SceneTensors, views: Sequence[View], search: Search) -> SceneT
     if np.mean(regions.labels > 0) < KNOWN:
         return scene
     outlines = Outlines(scene, [Surroundings.of(scene, 0, view) for view in views], search)
-    found: list[Group] = []
+    finest = outlines.around[-1]
+    found, parts = hairlines(regions, finest, search.proposer(finest))
+    regions = regions.hidden(parts)
     while len(found) < MOST and not outlines.are_hopeless and (top := outlines.topmost(regions)):
         found += [layer for each in top if not each.soft for layer in each.layers]
         if top[0].is_opaque:

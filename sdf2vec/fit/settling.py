@@ -20,7 +20,7 @@ from ..scene import Scene
 from ..steps import Steps, StepsOf
 from ..threads import threads_of_its_own
 from .adam import Moving, adam_over
-from .constraints import project
+from .constraints import least_length, project
 from .joining import detached
 from .least_squares import SceneProblem, count_numbers, is_simple
 from .levenberg import descend as down
@@ -128,11 +128,12 @@ def descend(
     moves. `softening`: layers are blurred in these runs, whose standard deviations are trained as well if free.
     """
     parts = [len(group.structure) for group in tensors.groups]
+    pixel = least_length(tensors, scene.pixel)
     with threads_of_its_own():
         if 0 < count_numbers(tensors) <= SOLVED and max(parts) <= MOST_PARTS and not softening:
-            _by_least_squares(tensors, settling, views(PHASES[-1].resolution), scene.pixel, frozen)
+            _by_least_squares(tensors, settling, views(PHASES[-1].resolution), pixel, frozen)
         elif 0 < tensors.layer_count <= LARGEST and sum(parts) <= ALL_PARTS:
-            _descend(tensors, settling, views, scene.pixel, frozen, phases, softening)
+            _descend(tensors, settling, views, pixel, frozen, phases, softening)
     for group in settling:
         group.settle(1.0)
 

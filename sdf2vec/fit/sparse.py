@@ -12,7 +12,7 @@ from dataclasses import dataclass
 from functools import partial
 
 from ..render.tensors import SceneTensors
-from .descents import FEW, JOINT, Sizes, all_improved, descended, softer
+from .descents import FEW, JOINT, Sizes, all_improved, descended, fine_enough, softer
 from .draw_order import opened
 from .joining import Search, faults_of, inserted
 from .mending import HELPS, carved, exchanged, replaced, rethought
@@ -88,6 +88,7 @@ def taken_apart(scene: SceneTensors, sizes: Sizes, search: Search, most: int) ->
     made = peeled(scene, sizes, search)
     if not 0 < made.layer_count <= most:
         return scene
+    sizes, search = fine_enough(sizes, search, made)
     made = softer(descended(made, sizes.joint, search, JOINT), sizes.joint, search)
     made = descended(made, sizes.joint, search, JOINT)
     return min(scene, made, key=partial(error_of, view=sizes.joint))

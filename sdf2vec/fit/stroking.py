@@ -21,15 +21,20 @@ from .covering import BOX, TRIANGLE, with_triangle
 from .frames import Frame, framed
 from .strokes import Bow, Line, Stroke, strokes
 
+KINDS_OF_STROKES = frozenset((BOX, CIRCLE, TRIANGLE))
 SEEN = 16  # points of the edge of a disc at an end of a bow
 WITHIN = 0.9  # of its radius: where they are
 
 
 def stroked(area: Area, proposer: Proposer) -> list[Group]:
     """Those of an area that is made of strokes; else none, nor where there may be no shapes of their kinds."""
-    if not {BOX, CIRCLE, TRIANGLE} <= set(proposer.kinds):
+    if not set(proposer.kinds) >= KINDS_OF_STROKES:
         return []
-    found = framed(strokes(area.coverage), area.coverage > 0.5)
+    return layers_of(framed(strokes(area.coverage), area.coverage > 0.5), area)
+
+
+def layers_of(found: Sequence[Stroke | Frame], area: Area) -> list[Group]:
+    """Those that draw some strokes, in the pixels of an area, in its colour."""
     return [_layer(stroke, found, area) for stroke in found]
 
 

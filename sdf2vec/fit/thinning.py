@@ -12,6 +12,7 @@ from ..image import Picture
 from ..render.tensors import SceneTensors, from_scene, to_scene
 from ..scene import Scene
 from ..threads import threads_of_its_own
+from .constraints import least_length
 from .descents import descended
 from .draw_order import without, without_all
 from .initialization import Layers
@@ -41,10 +42,10 @@ def thinned(
             raise Stopped
 
     layers = Layers(settings.kinds, scene.compositing)
-    generator, pixel = torch.Generator(), scene.pixel
+    tensors = from_scene(scene)
+    generator, pixel = torch.Generator(), least_length(tensors, scene.pixel)
     search = Search(layers, preset_of(settings).falloff, generator, tick, pixel)
     view = view_of(picture.premultiplied, settings, RESOLUTION)
-    tensors = from_scene(scene)
     is_small = tensors.layer_count <= FEW
     with threads_of_its_own(), suppress(Stopped):
         while count := tensors.layer_count:

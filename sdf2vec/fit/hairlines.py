@@ -1,0 +1,224 @@
+"""Lines too thin to be regions of one colour: a pixel or two wide, on what they cross.
+
+What regions don't explain is told by its colour: how much of each pixel it covers beside one or two regions. Enlarged,
+that is a region of its own, and its strokes are those of the lines.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from dataclasses import replace
+
+import numpy as np
+import torch
+from scipy import ndimage
+
+from ..arrays import BoolArray, Float64Array, IntArray
+from ..render.tensors import Group
+from .areas import Area, cover_at
+from .candidates import Proposer
+from .frames import Frame, framed
+from .offers import common_color
+from .region_graph import NEAR, Regions
+from .strokes import Line, Stroke, strokes
+from .stroking import KINDS_OF_STROKES, layers_of
+from .surroundings import Surroundings
+from .transparency import Overlay
+
+FINER = 3  # pixels of the enlarged coverage in one
+SMOOTH = 0.5  # pixels: standard deviation of what takes the steps off lines that are not antialiased
+WIDEST = 5  # pixels, with those at its edges, of a region that may be a part of a line
+OFF = 12.0 / 255  # by which a pixel differs from what regions make of it, at least
+COLORS = 6  # of lines
+PARTS = 200  # of one colour, at most: else it is a texture
+MOST_FRAMED = 12  # strokes among which frames are looked for: more are a grid
+LEAST = 6.0  # pixels that a line covers
+PEAK = 0.5  # share of the coverage along its middle where a line ends
+WRONG, BLUR = (
+    0.35,
+    0.8,
+)  # share of a line that its strokes miss or cover too much, where it is blurred by so many pixels
+SEEN, CORE = 0.1, 0.4  # coverage of a pixel by a line, at its edge; in its middle
+AROUND = np.ones((3, 3))
+TINY = 1e-9
+
+
+def hairlines(regions: Regions, around: Surroundings, proposer: Proposer) -> tuple[list[Group], BoolArray]:
+    """Layers of those of a picture, and the regions [R] that are parts of them; none where there may be no shapes of
+    their kinds.
+    """
+    if not set(proposer.kinds) >= KINDS_OF_STROKES:
+        return [], np.zeros(len(regions.colors), bool)
+    pixels = around.target.permute(1, 2, 0).numpy().astype(np.float64)
+    found = list(_covered(pixels, regions))
+    hidden = np.array([coverage > CORE for _, coverage in found]).reshape(-1, *regions.labels.shape)
+    layers: list[Group] = []
+    for index, (color, coverage) in enumerate(found):
+        others: BoolArray = np.delete(hidden, index, axis=0).max(axis=0, initial=False)
+        layers += _of_color(_across(coverage, others), color, regions, around, proposer)
+    if not layers:
+        return [], np.zeros(len(regions.colors), bool)
+    own = around.plane(cover_at(layers, around) > 0.5)
+    covered = np.bincount(regions.labels[own], minlength=len(regions.areas) + 1)[1:]
+    return layers, _slim(regions) & (covered > 0.5 * regions.areas)
+
+
+def _slim(regions: Regions) -> BoolArray:
+    """Which regions [R] are nowhere wider than a line."""
+    labels = regions.labels
+    wide = labels[ndimage.maximum_filter(labels, WIDEST) == ndimage.minimum_filter(labels, WIDEST)]
+    return np.asarray(np.bincount(wide, minlength=len(regions.areas) + 1)[1:] == 0)
+
+
+def _covered(pixels: Float64Array, regions: Regions) -> Iterator[tuple[Float64Array, Float64Array]]:
+    """The colours [C] of what regions don't explain, and how much of each pixel they cover [H, W]."""
+    low, high = _beside(regions)
+    off = np.abs(pixels - _between(pixels, low, high)).max(axis=2)
+    for _ in range(COLORS):
+        if np.sum(off > OFF) < LEAST:
+            return
+        color = _commonest(pixels, off)
+        coverage = np.where(off > OFF, _coverage(pixels, color, low, high), 0.0)
+        core = coverage > CORE
+        if not core.any():
+            return
+        near = ndimage.binary_dilation(core, AROUND)
+        yield color, np.where(near, coverage, 0.0)
+        off = np.where(near & (coverage > 0.0), 0.0, off)
+
+
+# --- what covers a pixel ------------------------------------------------------------------------------------
+
+
+def _beside(regions: Regions) -> tuple[Float64Array, Float64Array]:
+    """The colours [H, W, C] of one region near each pixel, and of another if there are two."""
+    black = np.zeros((1, regions.colors.shape[1]))
+    colors = np.concatenate([black, regions.colors])
+    wide = np.concatenate([[False], ~_slim(regions)])[regions.labels]
+    if not wide.any():
+        return colors[regions.labels], colors[regions.labels]
+    rows, columns = ndimage.distance_transform_edt(~wide, return_distances=False, return_indices=True)
+    labels = regions.labels[rows, columns]
+    high: IntArray = ndimage.maximum_filter(labels, NEAR)
+    low: IntArray = ndimage.minimum_filter(labels, NEAR)
+    return colors[low], colors[high]
+
+
+def _between(pixels: Float64Array, low: Float64Array, high: Float64Array) -> Float64Array:
+    """The mixture of two colours that is nearest to each pixel [H, W, C]."""
+    change = high - low
+    share = ((pixels - low) * change).sum(2) / np.maximum((change**2).sum(2), TINY)
+    return np.asarray(low + np.clip(share, 0.0, 1.0)[..., None] * change)
+
+
+def _commonest(pixels: Float64Array, off: Float64Array) -> Float64Array:
+    """The colour [C] that most of what differs has, by how much it does."""
+    differs = off > OFF
+    colors, weights = torch.from_numpy(pixels[differs]), torch.from_numpy(off[differs] ** 2)
+    return np.asarray(common_color(colors, weights).numpy())
+
+
+def _coverage(
+    pixels: Float64Array, color: Float64Array, low: Float64Array, high: Float64Array
+) -> Float64Array:
+    """How much of each pixel [H, W] a colour covers where the rest is a mixture of two others (least squares)."""
+    change, own, away = high - low, color - low, pixels - low
+    cc, co, oo = (change**2).sum(2), (change * own).sum(2), (own**2).sum(2)
+    ca, oa = (change * away).sum(2), (own * away).sum(2)
+    both = (cc * oa - co * ca) / np.maximum(cc * oo - co**2, TINY)
+    alone = oa / np.maximum(oo, TINY)
+    is_plane = cc * oo - co**2 > 1e-3 * cc * oo
+    found = np.clip(np.where(is_plane, both, alone), 0.0, 1.0)
+    rest = pixels - found[..., None] * color
+    left = (1.0 - found)[..., None]
+    foreign = np.abs(rest - _between(rest, left * low, left * high)).max(axis=2) > 2.0 * OFF
+    return np.where(foreign, 0.0, found)
+
+
+def _across(coverage: Float64Array, unseen: BoolArray) -> Float64Array:
+    """A coverage [H, W] that goes on where it is not seen as it is beside."""
+    if not unseen.any():
+        return coverage
+    rows, columns = ndimage.distance_transform_edt(unseen, return_distances=False, return_indices=True)
+    return np.asarray(coverage[rows, columns])
+
+
+# --- lines --------------------------------------------------------------------------------------------------
+
+
+def _of_color(
+    coverage: Float64Array, color: Float64Array, regions: Regions, around: Surroundings, proposer: Proposer
+) -> Iterator[Group]:
+    """Layers of lines of a colour [C], of which pixels are covered so far [H, W]."""
+    labels, count = ndimage.label(coverage > SEEN, AROUND)
+    if count > PARTS:
+        return
+    none = np.zeros(len(regions.colors), bool)
+    for number, (rows, columns) in enumerate(ndimage.find_objects(labels), 1):
+        own = np.where(labels[rows, columns] == number, coverage[rows, columns], 0.0)
+        if own.sum() < LEAST:
+            continue
+        window = around.window(rows, columns)
+        inside = torch.from_numpy(own.astype(np.float32)).flatten()
+        known = torch.ones_like(inside)
+        area = Area(Overlay(1.0, color, none, ~none), inside, known, (rows, columns), window, False)
+        layers = layers_of(_strokes_of(own), area)
+        if layers and _wrong(window.plane(area.cover(layers)), own) < WRONG * own.sum():
+            yield from layers
+
+
+def _wrong(cover: Float64Array, wanted: Float64Array) -> float:
+    """Pixels covered wrongly by what may be drawn without antialiasing."""
+    return float(np.abs(ndimage.gaussian_filter(cover - wanted, BLUR)).sum())
+
+
+def _strokes_of(coverage: Float64Array) -> list[Stroke | Frame]:
+    """Those of a coverage [H, W], in its pixels; as wide as what is covered asks for."""
+    plane = _enlarged(coverage)
+    depth = ndimage.maximum_filter(plane, FINER * 2 + 1)
+    peak = float(np.median(depth[plane > PEAK * plane.max()]))
+    found: list[Stroke | Frame] = [*strokes(plane / peak)]
+    if len(found) <= MOST_FRAMED:
+        found = framed(strokes(plane / peak), plane > PEAK * peak)
+    length = sum(stroke.length for stroke in found) / FINER
+    half = float(coverage.sum()) / 2.0 / max(length, TINY)
+    return [_smaller(stroke, half) for stroke in found]
+
+
+MARGIN = 3  # pixels around, so that edges are seen on all sides
+
+
+def _enlarged(coverage: Float64Array) -> Float64Array:
+    smooth = ndimage.gaussian_filter(np.pad(coverage, MARGIN), SMOOTH)
+    height, width = smooth.shape
+    rows, columns = ((np.arange(side * FINER) + 0.5) / FINER - 0.5 for side in (height, width))
+    places = np.meshgrid(rows, columns, indexing="ij")
+    return np.asarray(ndimage.map_coordinates(smooth, places, order=3, mode="nearest").clip(0.0, 1.0))
+
+
+def _smaller(stroke: Stroke | Frame, half: float) -> Stroke | Frame:
+    """A stroke of an enlarged coverage in pixels, with half the width that it has; its tips stay."""
+
+    def place(point: Float64Array) -> Float64Array:
+        return np.asarray((point + 0.5) / FINER - 0.5 - MARGIN)
+
+    more = stroke.half / FINER - half
+    if isinstance(stroke, Line):
+        way = more * (stroke.end - stroke.start) / max(stroke.length, TINY)
+        return Line(place(stroke.start) - way, place(stroke.end) + way, half, square=True)
+    if isinstance(stroke, Frame):
+        across, down = (side / FINER for side in stroke.sides)
+        return replace(
+            stroke, middle=place(stroke.middle), sides=(across, down), radius=stroke.radius / FINER, half=half
+        )
+    turn = min(more * FINER / stroke.radius, (math.tau - stroke.span) / 2.0)
+    return replace(
+        stroke,
+        middle=place(stroke.middle),
+        radius=stroke.radius / FINER,
+        first=stroke.first - turn,
+        span=stroke.span + 2.0 * turn,
+        half=half,
+        square=True,
+    )
