@@ -1,7 +1,8 @@
-"""Lines too thin to be regions of one colour: a pixel or two wide, on what they cross.
+"""Lines too thin to be regions of one colour: one to three pixels wide, on what they cross.
 
-What regions don't explain is told by its colour: how much of each pixel it covers beside one or two regions. Enlarged,
-that is a region of its own, and its strokes are those of the lines.
+What regions don't explain is told by its colour: how much of each pixel it covers, where the rest is of one or two
+regions. Enlarged that is a region of its own, of which the strokes are those of the lines; they are as wide as what is
+covered asks for. A line goes on below one of another colour that crosses it.
 """
 
 from __future__ import annotations
@@ -31,16 +32,27 @@ SMOOTH = 0.5  # pixels: standard deviation of what takes the steps off lines tha
 WIDEST = 5  # pixels, with those at its edges, of a region that may be a part of a line
 OFF = 12.0 / 255  # by which a pixel differs from what regions make of it, at least
 COLORS = 6  # of lines
+# quantile of how much of a colour pixels show, and that share of it: what has more than all of it is more of a line
+NEARLY, MORE = 0.85, 0.95
 PARTS = 200  # of one colour, at most: else it is a texture
 MOST_FRAMED = 12  # strokes among which frames are looked for: more are a grid
 LEAST = 6.0  # pixels that a line covers
 PEAK = 0.5  # share of the coverage along its middle where a line ends
-WRONG, BLUR = (
-    0.35,
-    0.8,
-)  # share of a line that its strokes miss or cover too much, where it is blurred by so many pixels
+# share of a line that its strokes miss or cover too much, where it is blurred by so many pixels
+WRONG, BLUR = 0.35, 0.8
 SEEN, CORE = 0.1, 0.4  # coverage of a pixel by a line, at its edge; in its middle
 AROUND = np.ones((3, 3))
+WAYS = (
+    (0, 1),
+    (1, 2),
+    (1, 1),
+    (2, 1),
+    (1, 0),
+    (2, -1),
+    (1, -1),
+    (1, -2),
+)  # rows and columns: directions of lines
+FAR = 8  # steps at most in which one line crosses another
 TINY = 1e-9
 
 
@@ -52,7 +64,8 @@ def hairlines(regions: Regions, around: Surroundings, proposer: Proposer) -> tup
         return [], np.zeros(len(regions.colors), bool)
     pixels = around.target.permute(1, 2, 0).numpy().astype(np.float64)
     found = list(_covered(pixels, regions))
-    hidden = np.array([coverage > CORE for _, coverage in found]).reshape(-1, *regions.labels.shape)
+    near = [ndimage.binary_dilation(coverage > CORE, AROUND) for _, coverage in found]
+    hidden = np.array(near, bool).reshape(-1, *regions.labels.shape)
     layers: list[Group] = []
     for index, (color, coverage) in enumerate(found):
         others: BoolArray = np.delete(hidden, index, axis=0).max(axis=0, initial=False)
@@ -78,8 +91,8 @@ def _covered(pixels: Float64Array, regions: Regions) -> Iterator[tuple[Float64Ar
     for _ in range(COLORS):
         if np.sum(off > OFF) < LEAST:
             return
-        color = _commonest(pixels, off)
-        coverage = np.where(off > OFF, _coverage(pixels, color, low, high), 0.0)
+        color = _color_of(pixels, off, low, high)
+        coverage = np.where(off > OFF, _amount(pixels, color, low, high).clip(0.0, 1.0), 0.0)
         core = coverage > CORE
         if not core.any():
             return
@@ -112,36 +125,61 @@ def _between(pixels: Float64Array, low: Float64Array, high: Float64Array) -> Flo
     return np.asarray(low + np.clip(share, 0.0, 1.0)[..., None] * change)
 
 
-def _commonest(pixels: Float64Array, off: Float64Array) -> Float64Array:
-    """The colour [C] that most of what differs has, by how much it does."""
+def _color_of(pixels: Float64Array, off: Float64Array, low: Float64Array, high: Float64Array) -> Float64Array:
+    """The colour [C] of a line: the commonest of what differs, by how much it does; of that which is more of the same,
+    if there is some, nearly the most: edges may be commoner than what they are the edges of.
+    """
     differs = off > OFF
     colors, weights = torch.from_numpy(pixels[differs]), torch.from_numpy(off[differs] ** 2)
-    return np.asarray(common_color(colors, weights).numpy())
+    color = np.asarray(common_color(colors, weights).numpy())
+    amount = _amount(pixels, color, low, high) * differs
+    most = float(np.quantile(amount[amount > CORE], NEARLY)) if (amount > CORE).any() else 1.0
+    return np.asarray(np.median(pixels[amount >= MORE * most], axis=0)) if MORE * most > 1.0 else color
 
 
-def _coverage(
-    pixels: Float64Array, color: Float64Array, low: Float64Array, high: Float64Array
-) -> Float64Array:
-    """How much of each pixel [H, W] a colour covers where the rest is a mixture of two others (least squares)."""
+def _amount(pixels: Float64Array, color: Float64Array, low: Float64Array, high: Float64Array) -> Float64Array:
+    """How much of a colour pixels [H, W, C] show beside a mixture of two others (least squares): more than all of it if
+    they differ more in the same way, and nothing where they show something else.
+    """
     change, own, away = high - low, color - low, pixels - low
     cc, co, oo = (change**2).sum(2), (change * own).sum(2), (own**2).sum(2)
     ca, oa = (change * away).sum(2), (own * away).sum(2)
     both = (cc * oa - co * ca) / np.maximum(cc * oo - co**2, TINY)
     alone = oa / np.maximum(oo, TINY)
     is_plane = cc * oo - co**2 > 1e-3 * cc * oo
-    found = np.clip(np.where(is_plane, both, alone), 0.0, 1.0)
-    rest = pixels - found[..., None] * color
-    left = (1.0 - found)[..., None]
+    found = np.where(is_plane, both, alone)
+    rest, left = pixels - found[..., None] * color, 1.0 - found[..., None]
     foreign = np.abs(rest - _between(rest, left * low, left * high)).max(axis=2) > 2.0 * OFF
     return np.where(foreign, 0.0, found)
 
 
 def _across(coverage: Float64Array, unseen: BoolArray) -> Float64Array:
-    """A coverage [H, W] that goes on where it is not seen as it is beside."""
+    """A coverage [H, W] that goes on where it is not seen, if it is there on both sides."""
     if not unseen.any():
         return coverage
-    rows, columns = ndimage.distance_transform_edt(unseen, return_distances=False, return_indices=True)
-    return np.asarray(coverage[rows, columns])
+    found = np.where(unseen, 0.0, coverage)
+    between = np.zeros_like(found)
+    for way in WAYS:
+        ahead, behind = (_first_seen(found, unseen, sign * np.array(way)) for sign in (1, -1))
+        between = np.maximum(between, np.minimum(ahead, behind))
+    return np.where(unseen, between, coverage)
+
+
+def _first_seen(values: Float64Array, unseen: BoolArray, way: IntArray) -> Float64Array:
+    """What is seen first from each pixel in a direction; 0 where that is too far."""
+    found, left = np.zeros_like(values), unseen.copy()
+    for step in range(1, FAR + 1):
+        moved, hidden = (_moved(plane, step * way) for plane in (values, unseen))
+        found = np.where(left & ~hidden, moved, found)
+        left &= hidden
+    return found
+
+
+def _moved(plane: np.ndarray, way: IntArray) -> np.ndarray:
+    """A plane whose pixels are those so far down and to the right; at its sides those of the side."""
+    rows, columns = (np.arange(side) + step for side, step in zip(plane.shape, way.tolist(), strict=True))
+    height, width = plane.shape
+    return plane[np.ix_(rows.clip(0, height - 1), columns.clip(0, width - 1))]
 
 
 # --- lines --------------------------------------------------------------------------------------------------
