@@ -41,14 +41,23 @@ def room_of(tensors: SceneTensors, pixel: float, falloff: tuple[float, float]) -
 
 
 def least_length(tensors: SceneTensors, pixel: float) -> float:
-    """The least that lengths of a scene may be, in scene units: a pixel, or half of what it has less of."""
-    lengths = [
-        float(values.min())
-        for group in tensors.groups
-        for slot, values in group.values.items()
-        if len(group) and slot.parameter.unit is LENGTH and slot.parameter.positive
-    ]
-    return min([pixel, *(0.5 * length for length in lengths if length < pixel)])
+    """The least that lengths of a scene may be, in scene units: a pixel, or half where it has one that is less. What is
+    not even a pixel wide covers more of it in a render than it does.
+    """
+    return 0.5 * pixel if count_shorter(tensors, pixel) else pixel
+
+
+def count_shorter(tensors: SceneTensors, length: float) -> int:
+    """How many layers of a scene have a length, of those that must be positive, that is less."""
+    return sum(int(_has_shorter(group, length).sum()) for group in tensors.groups)
+
+
+def _has_shorter(group: Group, length: float) -> torch.Tensor:
+    found = torch.zeros(len(group), dtype=torch.bool)
+    for slot, values in group.values.items():
+        if slot.parameter.unit is LENGTH and slot.parameter.positive:
+            found |= (values < length).any(1).cpu()
+    return found
 
 
 def project_group(group: Group, room: Room) -> None:

@@ -13,7 +13,7 @@ from ..blend import SUBTRACTION
 from ..render.tensors import SceneTensors
 from ..units import FALLOFF
 from .adam import adam_over
-from .constraints import enforce_min_thickness, least_length, project, thicknesses_of
+from .constraints import count_shorter, enforce_min_thickness, least_length, project
 from .draw_order import reordered
 from .joining import Search, detached, inserted
 from .least_squares import count_numbers, improved
@@ -31,7 +31,7 @@ SOFT = 2.0  # pixels of the picture where all descend: edges that may become sof
 SOFTENED, FOUND = 0.8, 10**-3  # of the error before, and mean squared error, at most, after edges became soft
 # pixels of falloff, where a picture is seen largest, of what may be sharp; times the error that it may then have
 NEARLY_SHARP, ABOUT = 2.5, 1.5
-THIN = 1.5  # pixels of the picture where all descend: what is thinner is seen too little of there
+THIN = 0.75  # pixels of the picture where all descend: half a width of which too little is seen there
 
 
 class Sizes(NamedTuple):
@@ -43,9 +43,8 @@ class Sizes(NamedTuple):
 
 
 def fine_enough(sizes: Sizes, search: Search, scene: SceneTensors) -> tuple[Sizes, Search]:
-    """The same where shapes may be as thin as those of a scene, and all descend where these are seen."""
-    pixel = scene.size[1] / sizes.joint.target.shape[1]
-    if any(bool((width < THIN * pixel).any()) for width in thicknesses_of(scene)):
+    """The same where shapes may be as thin as those of a scene, and all descend where these are seen if most are so."""
+    if 2 * count_shorter(scene, THIN * scene.size[1] / sizes.joint.target.shape[1]) > scene.layer_count:
         sizes = sizes._replace(joint=sizes.last)
     return sizes, replace(search, pixel=least_length(scene, search.pixel))
 

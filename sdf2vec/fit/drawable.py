@@ -164,7 +164,9 @@ def _grow(group: Group, margin: torch.Tensor, pixel: float) -> None:
         own = -margin if part.join == SUBTRACTION else margin
         lengths = [slot for slot in group.values if slot.part == index and slot.parameter.name in GROWING]
         for slot in lengths:
-            group.values[slot].add_(own).clamp_(min=pixel if slot.parameter.positive else 0.0)
+            values = group.values[slot]
+            least = values.clamp(max=pixel if slot.parameter.positive else 0.0)  # thin ones get no thinner
+            values.copy_(torch.maximum(values + own, least))
         if not lengths:
             corners = [
                 slot for slot in group.values if slot.part == index and slot.parameter.unit is POSITION

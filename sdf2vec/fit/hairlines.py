@@ -40,6 +40,7 @@ LEAST = 6.0  # pixels that a line covers
 PEAK = 0.5  # share of the coverage along its middle where a line ends
 # share of a line that its strokes miss or cover too much, where it is blurred by so many pixels
 WRONG, BLUR = 0.35, 0.8
+MOSTLY = 0.6  # share of what no region explains that lines do, at least
 SEEN, CORE = 0.1, 0.4  # coverage of a pixel by a line, at its edge; in its middle
 AROUND = np.ones((3, 3))
 WAYS = (
@@ -58,7 +59,7 @@ TINY = 1e-9
 
 def hairlines(regions: Regions, around: Surroundings, proposer: Proposer) -> tuple[list[Group], BoolArray]:
     """Layers of those of a picture, and the regions [R] that are parts of them; none where there may be no shapes of
-    their kinds.
+    their kinds, or they are little of what no region explains: then that is made of other things.
     """
     if not set(proposer.kinds) >= KINDS_OF_STROKES:
         return [], np.zeros(len(regions.colors), bool)
@@ -70,10 +71,11 @@ def hairlines(regions: Regions, around: Surroundings, proposer: Proposer) -> tup
     for index, (color, coverage) in enumerate(found):
         others: BoolArray = np.delete(hidden, index, axis=0).max(axis=0, initial=False)
         layers += _of_color(_across(coverage, others), color, regions, around, proposer)
-    if not layers:
+    cover = around.plane(cover_at(layers, around))
+    off = _unexplained(pixels, *_beside(regions))
+    if off[cover > SEEN].sum() <= MOSTLY * off.sum():
         return [], np.zeros(len(regions.colors), bool)
-    own = around.plane(cover_at(layers, around) > 0.5)
-    covered = np.bincount(regions.labels[own], minlength=len(regions.areas) + 1)[1:]
+    covered = np.bincount(regions.labels[cover > 0.5], minlength=len(regions.areas) + 1)[1:]
     return layers, _slim(regions) & (covered > 0.5 * regions.areas)
 
 
@@ -87,12 +89,12 @@ def _slim(regions: Regions) -> BoolArray:
 def _covered(pixels: Float64Array, regions: Regions) -> Iterator[tuple[Float64Array, Float64Array]]:
     """The colours [C] of what regions don't explain, and how much of each pixel they cover [H, W]."""
     low, high = _beside(regions)
-    off = np.abs(pixels - _between(pixels, low, high)).max(axis=2)
+    off = _unexplained(pixels, low, high)
     for _ in range(COLORS):
-        if np.sum(off > OFF) < LEAST:
+        if np.sum(off > 0.0) < LEAST:
             return
         color = _color_of(pixels, off, low, high)
-        coverage = np.where(off > OFF, _amount(pixels, color, low, high).clip(0.0, 1.0), 0.0)
+        coverage = np.where(off > 0.0, _amount(pixels, color, low, high).clip(0.0, 1.0), 0.0)
         core = coverage > CORE
         if not core.any():
             return
@@ -118,6 +120,12 @@ def _beside(regions: Regions) -> tuple[Float64Array, Float64Array]:
     return colors[low], colors[high]
 
 
+def _unexplained(pixels: Float64Array, low: Float64Array, high: Float64Array) -> Float64Array:
+    """By how much pixels [H, W] differ from all mixtures of two colours; 0 where that is little."""
+    off = np.abs(pixels - _between(pixels, low, high)).max(axis=2)
+    return np.where(off > OFF, off, 0.0)
+
+
 def _between(pixels: Float64Array, low: Float64Array, high: Float64Array) -> Float64Array:
     """The mixture of two colours that is nearest to each pixel [H, W, C]."""
     change = high - low
@@ -129,7 +137,7 @@ def _color_of(pixels: Float64Array, off: Float64Array, low: Float64Array, high: 
     """The colour [C] of a line: the commonest of what differs, by how much it does; of that which is more of the same,
     if there is some, nearly the most: edges may be commoner than what they are the edges of.
     """
-    differs = off > OFF
+    differs = off > 0.0
     colors, weights = torch.from_numpy(pixels[differs]), torch.from_numpy(off[differs] ** 2)
     color = np.asarray(common_color(colors, weights).numpy())
     amount = _amount(pixels, color, low, high) * differs

@@ -129,5 +129,5 @@ def test_lengths_may_be_less_than_a_pixel_where_some_are():
         scene = Scene(SIDE, SIDE, (sharp_box(BLUE, 10, 40, 80, 40 + width),), (1.0, 1.0, 1.0))
         return least_length(from_scene(scene), scene.pixel) * SIDE
 
-    assert least(1.0) == pytest.approx(0.25, abs=1e-3)
+    assert least(1.5) == pytest.approx(0.5, abs=1e-3)
     assert least(3.0) == pytest.approx(1.0, abs=1e-3)
