@@ -171,7 +171,13 @@ class Search:
     falloff: tuple[float, float]
     generator: torch.Generator
     tick: Tick
-    pixel: float  # scene units: the least length
+    pixel: float  # scene units: how thick shapes are at least
+    thin: bool = False  # whether lengths may be half of that
+
+    @property
+    def least(self) -> float:
+        """Scene units: the least length."""
+        return 0.5 * self.pixel if self.thin else self.pixel
 
     def joined(self, layer: Group, around: Surroundings, most: int) -> tuple[list[Tried], int]:
         """The best few with shapes joined, to a layer or to one begun anew, while that helps.
@@ -275,7 +281,7 @@ class Search:
         """Which numbers of a structure's rows move, how far in one step, and what keeps them in their range."""
         scene, bottom = around.scene, torch.zeros(1, dtype=torch.int64)
         every = [moves(slot) for slot in slots(structure) for _ in range(slot.parameter.width)]
-        room = room_of(scene, self.pixel, self.falloff)
+        room = room_of(scene, self.least, self.falloff)
         return Numbers.where(
             every,
             longest_steps(structure, scene),

@@ -42,7 +42,7 @@ def improved(
     if not scene.groups:
         return scene
     problem = SceneProblem(detached(scene), view)
-    keep = partial(project, pixel=search.pixel, falloff=search.falloff)
+    keep = partial(project, pixel=search.least, falloff=search.falloff)
     numbers = problem.numbers(keep, is_simple if simple else lambda slot, value: False)
     row, _ = descend(problem.row(), problem, numbers, steps, search.tick)
     made = detached(problem.scene_of(row))

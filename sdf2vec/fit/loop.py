@@ -113,8 +113,8 @@ class Fit:
         self.generator = torch.Generator().manual_seed(settings.seed)
         self.pixels = picture.premultiplied
         self.sides = (picture.width, picture.height)
-        pixel = 1.0 / min(self.sides)
-        self.size = (picture.width * pixel, picture.height * pixel)
+        self.pixel = 1.0 / min(self.sides)
+        self.size = (picture.width * self.pixel, picture.height * self.pixel)
         self.wanted = settings.most // settings.union  # layers
         self.starts = 1 if settings.start is not None else self.preset.starts(self.wanted)
         self.done, self.steps, self.stopped = 0, self._count_steps(), False
@@ -129,7 +129,7 @@ class Fit:
     def _begin(self) -> None:
         start = self._start()
         self.tensors = on_device(start, self.backend.device)
-        self.pixel = least_length(start, 1.0 / min(self.sides))
+        self.least = least_length(start, self.pixel)
         self.optimizer, self.steady = self._adam(), Steady()
         self.taken: Steps | None = None  # how steps are, as long as the layers are the same
 
@@ -290,7 +290,7 @@ class Fit:
         phase = stage.phase
         best = None
         if phase.growth is None and phase.relocation is None:
-            project(self.tensors, self.pixel, self.preset.falloff)  # a start may be out of range
+            project(self.tensors, self.least, self.preset.falloff)  # a start may be out of range
             best = Best(self.tensors)
         ground = mean_color(stage.target, stage.weights)
         self.steady.begin(small_loss(stage.measure, stage.target, ground))
@@ -334,7 +334,7 @@ class Fit:
         return loss
 
     def _steps(self, stage: Stage) -> Steps:
-        keep = partial(project, self.tensors, self.pixel, self.preset.falloff)
+        keep = partial(project, self.tensors, self.least, self.preset.falloff)
         return self.backend.steps(partial(self._value, stage), self.backend.composite, self.optimizer, keep)
 
     def _value(self, stage: Stage, composite: Composite) -> torch.Tensor:

@@ -12,7 +12,7 @@ from sdf2vec.fit import settling
 from sdf2vec.fit.drawable import drawable, rounded, softnesses
 from sdf2vec.fit.settling import views_of
 from sdf2vec.grain import DENSE, GRAINS, USUAL, Grain, is_drawable
-from sdf2vec.image import load
+from sdf2vec.image import Picture, load
 from sdf2vec.quality import psnr_of
 from sdf2vec.render.draw import pixels_of
 from tests.scenes import random_scene
@@ -155,3 +155,11 @@ def test_no_layers():
     scene = Scene(8, 8, (), (0.5, 0.5, 0.5))
     assert rounded(scene, GRAIN) == (scene, ())
     assert rounded(scene, DENSE) == (scene, ())
+
+
+def test_what_is_thinner_than_two_pixels_stays_so():
+    """Half a width may be less than a pixel: no small drawing makes lines bolder."""
+    box = Shape("box", (0.0, 0.0, 0.4, 0.7 / 64, 0.3, 0.0), PALE)
+    scene = Scene(64, 64, (Layer((box,)),), (0.2, 0.2, 0.3))
+    for found in (rounded(scene, USUAL[0]), drawable(scene, views_of(Picture(pixels_of(scene))), USUAL[0])):
+        assert 64 * found.scene.layers[0].shapes[0].parameters[3] == pytest.approx(0.7, rel=0.1)

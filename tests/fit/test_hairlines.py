@@ -4,12 +4,14 @@ import numpy as np
 import pytest
 import torch
 
+from sdf2vec import fit
 from sdf2vec.api import render
 from sdf2vec.fit.constraints import least_length
 from sdf2vec.fit.hairlines import hairlines
 from sdf2vec.fit.peeling import peeled
 from sdf2vec.fit.region_graph import Regions
 from sdf2vec.fit.surroundings import Surroundings
+from sdf2vec.image import Picture
 from sdf2vec.render.tensors import SceneTensors, from_scene, to_scene
 from sdf2vec.scene import Scene
 from tests.fit.drawn import (
@@ -131,3 +133,16 @@ def test_lengths_may_be_less_than_a_pixel_where_some_are():
 
     assert least(1.5) == pytest.approx(0.5, abs=1e-3)
     assert least(3.0) == pytest.approx(1.0, abs=1e-3)
+
+
+def test_a_chart_is_its_lines():
+    """Where all descend at half the size, nothing of them is left."""
+    pixels = painted(
+        (line(14, 8, 14, 80, 1.2), (0.2, 0.2, 0.2), 1.0),
+        (line(14, 80.3, 90, 80.3, 1.2), (0.2, 0.2, 0.2), 1.0),
+        (line(16, 70, 50, 30, 1.5), RED, 1.0),
+        (line(50, 30, 88, 44, 1.5), RED, 1.0),
+    )
+    scene = fit(Picture(pixels.astype(np.float32)), seed=0)
+    assert [shape.kind for layer in scene.layers for shape in layer.shapes] == ["box"] * 4
+    assert -10 * np.log10(np.mean((render(scene) - pixels) ** 2)) > 38
