@@ -8,7 +8,7 @@ covered asks for. A line goes on below one of another colour that crosses it.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -16,10 +16,13 @@ import torch
 from scipy import ndimage
 
 from ..arrays import BoolArray, Float64Array, IntArray
-from ..render.tensors import Group
-from .areas import Area, cover_at
+from ..blend import OVER
+from ..render import fused
+from ..render.tensors import Group, SceneTensors
+from .areas import Area
 from .candidates import Proposer
 from .frames import Frame, framed
+from .joining import inserted
 from .offers import common_color
 from .region_graph import NEAR, Regions
 from .strokes import Line, Stroke, strokes
@@ -34,8 +37,8 @@ OFF = 12.0 / 255  # by which a pixel differs from what regions make of it, at le
 COLORS = 6  # of lines
 # quantile of how much of a colour pixels show, and that share of it: what has more than all of it is more of a line
 NEARLY, MORE = 0.85, 0.95
-PARTS = 200  # of one colour, at most: else it is a texture
-MOST_FRAMED = 12  # strokes among which frames are looked for: more are a grid
+PARTS, MOST = 200, 100  # of one colour; lines: more are a texture
+MOST_FRAMED = 8  # strokes among which frames are looked for: more are a grid
 LEAST = 6.0  # pixels that a line covers
 PEAK = 0.5  # share of the coverage along its middle where a line ends
 # share of a line that its strokes miss or cover too much, where it is blurred by so many pixels
@@ -70,13 +73,24 @@ def hairlines(regions: Regions, around: Surroundings, proposer: Proposer) -> tup
     layers: list[Group] = []
     for index, (color, coverage) in enumerate(found):
         others: BoolArray = np.delete(hidden, index, axis=0).max(axis=0, initial=False)
-        layers += _of_color(_across(coverage, others), color, regions, around, proposer)
-    cover = around.plane(cover_at(layers, around))
+        layers += _of_color(_across(coverage, others), color, regions, around)
+        if len(layers) > MOST:
+            return [], np.zeros(len(regions.colors), bool)
+    cover = _cover(layers, around)
     off = _unexplained(pixels, *_beside(regions))
     if off[cover > SEEN].sum() <= MOSTLY * off.sum():
         return [], np.zeros(len(regions.colors), bool)
     covered = np.bincount(regions.labels[cover > 0.5], minlength=len(regions.areas) + 1)[1:]
     return layers, _slim(regions) & (covered > 0.5 * regions.areas)
+
+
+def _cover(layers: Sequence[Group], around: Surroundings) -> Float64Array:
+    """How much of each pixel some opaque layers cover together [H, W]."""
+    scene = SceneTensors([], torch.zeros(4), OVER, around.scene.size)
+    for layer in layers:
+        scene = inserted(scene, replace(layer, order=torch.tensor([scene.layer_count])))
+    height, width = around.shape
+    return np.asarray(fused.composite(scene, width, height)[3].numpy().astype(np.float64))
 
 
 def _slim(regions: Regions) -> BoolArray:
@@ -194,7 +208,7 @@ def _moved(plane: np.ndarray, way: IntArray) -> np.ndarray:
 
 
 def _of_color(
-    coverage: Float64Array, color: Float64Array, regions: Regions, around: Surroundings, proposer: Proposer
+    coverage: Float64Array, color: Float64Array, regions: Regions, around: Surroundings
 ) -> Iterator[Group]:
     """Layers of lines of a colour [C], of which pixels are covered so far [H, W]."""
     labels, count = ndimage.label(coverage > SEEN, AROUND)
@@ -209,8 +223,9 @@ def _of_color(
         inside = torch.from_numpy(own.astype(np.float32)).flatten()
         known = torch.ones_like(inside)
         area = Area(Overlay(1.0, color, none, ~none), inside, known, (rows, columns), window, False)
-        layers = layers_of(_strokes_of(own), area)
-        if layers and _wrong(window.plane(area.cover(layers)), own) < WRONG * own.sum():
+        found = _strokes_of(own)
+        layers = layers_of(found, area) if len(found) <= MOST else []
+        if layers and _wrong(_cover(layers, around)[rows, columns], own) < WRONG * own.sum():
             yield from layers
 
 

@@ -13,6 +13,7 @@ from ..arrays import BoolArray, Float64Array
 from .arcs import circles_of, sums_of
 from .bones import CLEAR, LEAST, depth_of, middle_lines, pixels_of, seen
 
+MOST = 2000  # points of a path that is parted at once: pairs of them are looked at
 STRIDE = 2  # points between those at which a line may become a bow
 CLOSED = 1.5  # pixels between the ends of a path around
 ROUGH = 0.5  # pixels that points are off where they are of one piece, many of them together
@@ -160,7 +161,12 @@ def strokes(coverage: Float64Array) -> list[Stroke]:
     """Those of a region's coverage [H, W], the longest first; none where it is not of one width."""
     inside = coverage > 0.5
     depth = depth_of(inside)
-    pieces = [piece for line in middle_lines(coverage) for piece in _pieces(line.points, line.half)]
+    pieces = [
+        piece
+        for line in middle_lines(coverage)
+        for part in np.array_split(line.points, math.ceil(len(line.points) / MOST))
+        for piece in _pieces(part, line.half)
+    ]
     grown = [_grown(piece, depth) for piece in pieces]
     return _needed(sorted(grown, key=lambda stroke: -stroke.length), inside)
 
