@@ -30,7 +30,7 @@ from .stroking import KINDS_OF_STROKES, layers_of
 from .surroundings import Surroundings
 from .transparency import Overlay
 
-FINER = 3  # pixels of the enlarged coverage in one
+FINER, MARGIN = 3, 3  # pixels of the enlarged coverage in one; around it, so that edges are seen on all sides
 SMOOTH = 0.5  # pixels: standard deviation of what takes the steps off lines that are not antialiased
 WIDEST = 5  # pixels, with those at its edges, of a region that may be a part of a line
 OFF = 12.0 / 255  # by which a pixel differs from what regions make of it, at least
@@ -46,16 +46,8 @@ WRONG, BLUR = 0.35, 0.8
 MOSTLY = 0.6  # share of what no region explains that lines do, at least
 SEEN, CORE = 0.1, 0.4  # coverage of a pixel by a line, at its edge; in its middle
 AROUND = np.ones((3, 3))
-WAYS = (
-    (0, 1),
-    (1, 2),
-    (1, 1),
-    (2, 1),
-    (1, 0),
-    (2, -1),
-    (1, -1),
-    (1, -2),
-)  # rows and columns: directions of lines
+# rows and columns: directions of lines
+WAYS = np.array([(0, 1), (1, 2), (1, 1), (2, 1), (1, 0), (2, -1), (1, -1), (1, -2)])
 FAR = 8  # steps at most in which one line crosses another
 TINY = 1e-9
 
@@ -182,7 +174,7 @@ def _across(coverage: Float64Array, unseen: BoolArray) -> Float64Array:
     found = np.where(unseen, 0.0, coverage)
     between = np.zeros_like(found)
     for way in WAYS:
-        ahead, behind = (_first_seen(found, unseen, sign * np.array(way)) for sign in (1, -1))
+        ahead, behind = (_first_seen(found, unseen, sign * way) for sign in (1, -1))
         between = np.maximum(between, np.minimum(ahead, behind))
     return np.where(unseen, between, coverage)
 
@@ -239,15 +231,11 @@ def _strokes_of(coverage: Float64Array) -> list[Stroke | Frame]:
     plane = _enlarged(coverage)
     depth = ndimage.maximum_filter(plane, FINER * 2 + 1)
     peak = float(np.median(depth[plane > PEAK * plane.max()]))
-    found: list[Stroke | Frame] = [*strokes(plane / peak)]
-    if len(found) <= MOST_FRAMED:
-        found = framed(strokes(plane / peak), plane > PEAK * peak)
+    drawn = strokes(plane / peak)
+    found = framed(drawn, plane > PEAK * peak) if len(drawn) <= MOST_FRAMED else [*drawn]
     length = sum(stroke.length for stroke in found) / FINER
     half = float(coverage.sum()) / 2.0 / max(length, TINY)
     return [_smaller(stroke, half) for stroke in found]
-
-
-MARGIN = 3  # pixels around, so that edges are seen on all sides
 
 
 def _enlarged(coverage: Float64Array) -> Float64Array:

@@ -13,8 +13,8 @@ from ..arrays import BoolArray, Float64Array
 from .arcs import circles_of, sums_of
 from .bones import CLEAR, LEAST, depth_of, middle_lines, pixels_of, seen
 
-MOST = 2000  # points of a path that is parted at once: pairs of them are looked at
-STRIDE = 2  # points between those at which a line may become a bow
+# points between those at which a line may become a bow, at least; most of these: pairs of them are looked at
+STRIDE, MOST = 2, 1000
 CLOSED = 1.5  # pixels between the ends of a path around
 ROUGH = 0.5  # pixels that points are off where they are of one piece, many of them together
 LINE, BOW = 30.0, 36.0  # what a piece costs beside squared distances, in units of that
@@ -161,12 +161,7 @@ def strokes(coverage: Float64Array) -> list[Stroke]:
     """Those of a region's coverage [H, W], the longest first; none where it is not of one width."""
     inside = coverage > 0.5
     depth = depth_of(inside)
-    pieces = [
-        piece
-        for line in middle_lines(coverage)
-        for part in np.array_split(line.points, math.ceil(len(line.points) / MOST))
-        for piece in _pieces(part, line.half)
-    ]
+    pieces = [piece for line in middle_lines(coverage) for piece in _pieces(line.points, line.half)]
     grown = [_grown(piece, depth) for piece in pieces]
     return _needed(sorted(grown, key=lambda stroke: -stroke.length), inside)
 
@@ -219,7 +214,8 @@ def _passage(one: Stroke, other: Stroke, near: Float64Array) -> Float64Array | N
 
 def _cuts(path: Float64Array) -> tuple[list[int], list[bool]]:
     """The points at which its pieces begin and end, and which pieces are bows."""
-    nodes = np.unique(np.append(np.arange(0, len(path), STRIDE), len(path) - 1))
+    stride = max(STRIDE, math.ceil(len(path) / MOST))
+    nodes = np.unique(np.append(np.arange(0, len(path), stride), len(path) - 1))
     sums = sums_of(path)
     first, last = np.triu_indices(len(nodes), 1)
     own = sums[nodes[last] + 1] - sums[nodes[first]]
