@@ -13,7 +13,7 @@ from ..blend import SUBTRACTION
 from ..render.tensors import SceneTensors
 from ..units import FALLOFF
 from .adam import adam_over
-from .constraints import count_shorter, enforce_min_thickness, project
+from .constraints import count_shorter, enforce_min_thickness, least_length, project
 from .draw_order import reordered
 from .joining import Search, detached, inserted
 from .least_squares import count_numbers, improved
@@ -46,7 +46,7 @@ def fine_enough(sizes: Sizes, search: Search, scene: SceneTensors) -> tuple[Size
     """The same where shapes may be as thin as those of a scene, and all descend where these are seen if most are so."""
     if 2 * count_shorter(scene, THIN * scene.size[1] / sizes.joint.target.shape[1]) > scene.layer_count:
         sizes = sizes._replace(joint=sizes.last)
-    return sizes, replace(search, thin=bool(count_shorter(scene, search.pixel)))
+    return sizes, replace(search, shortest=least_length(scene, search.pixel))
 
 
 def descended(

@@ -8,7 +8,7 @@ covered asks for. A line goes on below one of another colour that crosses it.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Collection, Iterator, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -20,9 +20,8 @@ from ..blend import OVER
 from ..render import fused
 from ..render.tensors import Group, SceneTensors
 from .areas import Area
-from .candidates import Proposer
 from .frames import Frame, framed
-from .joining import inserted
+from .joining import topped
 from .offers import common_color
 from .region_graph import NEAR, Regions
 from .strokes import Line, Stroke, strokes
@@ -52,35 +51,37 @@ FAR = 8  # steps at most in which one line crosses another
 TINY = 1e-9
 
 
-def hairlines(regions: Regions, around: Surroundings, proposer: Proposer) -> tuple[list[Group], BoolArray]:
+def hairlines(
+    regions: Regions, around: Surroundings, kinds: Collection[str]
+) -> tuple[list[Group], BoolArray]:
     """Layers of those of a picture, and the regions [R] that are parts of them; none where there may be no shapes of
     their kinds, or they are little of what no region explains: then that is made of other things.
     """
-    if not set(proposer.kinds) >= KINDS_OF_STROKES:
-        return [], np.zeros(len(regions.colors), bool)
+    slim = _slim(regions)
+    none: tuple[list[Group], BoolArray] = [], np.zeros_like(slim)
+    if not KINDS_OF_STROKES.issubset(kinds):
+        return none
     pixels = around.target.permute(1, 2, 0).numpy().astype(np.float64)
-    found = list(_covered(pixels, regions))
+    low, high = _beside(regions, ~slim)
+    off = _unexplained(pixels, low, high)
+    found = list(_covered(pixels, off, low, high))
     near = [ndimage.binary_dilation(coverage > CORE, AROUND) for _, coverage in found]
-    hidden = np.array(near, bool).reshape(-1, *regions.labels.shape)
+    hidden = np.array(near, bool).reshape(-1, *off.shape)
     layers: list[Group] = []
     for index, (color, coverage) in enumerate(found):
         others: BoolArray = np.delete(hidden, index, axis=0).max(axis=0, initial=False)
-        layers += _of_color(_across(coverage, others), color, regions, around)
+        layers += _lines_of(_across(coverage, others), color, regions, around)
         if len(layers) > MOST:
-            return [], np.zeros(len(regions.colors), bool)
+            return none
     cover = _cover(layers, around)
-    off = _unexplained(pixels, *_beside(regions))
     if off[cover > SEEN].sum() <= MOSTLY * off.sum():
-        return [], np.zeros(len(regions.colors), bool)
-    covered = np.bincount(regions.labels[cover > 0.5], minlength=len(regions.areas) + 1)[1:]
-    return layers, _slim(regions) & (covered > 0.5 * regions.areas)
+        return none
+    return layers, slim & (regions.count(cover > 0.5) > 0.5 * regions.areas)
 
 
 def _cover(layers: Sequence[Group], around: Surroundings) -> Float64Array:
     """How much of each pixel some opaque layers cover together [H, W]."""
-    scene = SceneTensors([], torch.zeros(4), OVER, around.scene.size)
-    for layer in layers:
-        scene = inserted(scene, replace(layer, order=torch.tensor([scene.layer_count])))
+    scene = topped(SceneTensors([], torch.zeros(4), OVER, around.scene.size), layers)
     height, width = around.shape
     return np.asarray(fused.composite(scene, width, height)[3].numpy().astype(np.float64))
 
@@ -88,14 +89,14 @@ def _cover(layers: Sequence[Group], around: Surroundings) -> Float64Array:
 def _slim(regions: Regions) -> BoolArray:
     """Which regions [R] are nowhere wider than a line."""
     labels = regions.labels
-    wide = labels[ndimage.maximum_filter(labels, WIDEST) == ndimage.minimum_filter(labels, WIDEST)]
-    return np.asarray(np.bincount(wide, minlength=len(regions.areas) + 1)[1:] == 0)
+    wide = ndimage.maximum_filter(labels, WIDEST) == ndimage.minimum_filter(labels, WIDEST)
+    return np.asarray(regions.count(wide) == 0)
 
 
-def _covered(pixels: Float64Array, regions: Regions) -> Iterator[tuple[Float64Array, Float64Array]]:
+def _covered(
+    pixels: Float64Array, off: Float64Array, low: Float64Array, high: Float64Array
+) -> Iterator[tuple[Float64Array, Float64Array]]:
     """The colours [C] of what regions don't explain, and how much of each pixel they cover [H, W]."""
-    low, high = _beside(regions)
-    off = _unexplained(pixels, low, high)
     for _ in range(COLORS):
         if np.sum(off > 0.0) < LEAST:
             return
@@ -112,14 +113,14 @@ def _covered(pixels: Float64Array, regions: Regions) -> Iterator[tuple[Float64Ar
 # --- what covers a pixel ------------------------------------------------------------------------------------
 
 
-def _beside(regions: Regions) -> tuple[Float64Array, Float64Array]:
-    """The colours [H, W, C] of one region near each pixel, and of another if there are two."""
+def _beside(regions: Regions, chosen: BoolArray) -> tuple[Float64Array, Float64Array]:
+    """The colours [H, W, C] of one of some regions [R] near each pixel, and of another if there are two."""
     black = np.zeros((1, regions.colors.shape[1]))
     colors = np.concatenate([black, regions.colors])
-    wide = np.concatenate([[False], ~_slim(regions)])[regions.labels]
-    if not wide.any():
+    own = regions.place(chosen)
+    if not own.any():
         return colors[regions.labels], colors[regions.labels]
-    rows, columns = ndimage.distance_transform_edt(~wide, return_distances=False, return_indices=True)
+    rows, columns = ndimage.distance_transform_edt(~own, return_distances=False, return_indices=True)
     labels = regions.labels[rows, columns]
     high: IntArray = ndimage.maximum_filter(labels, NEAR)
     low: IntArray = ndimage.minimum_filter(labels, NEAR)
@@ -199,7 +200,7 @@ def _moved(plane: np.ndarray, way: IntArray) -> np.ndarray:
 # --- lines --------------------------------------------------------------------------------------------------
 
 
-def _of_color(
+def _lines_of(
     coverage: Float64Array, color: Float64Array, regions: Regions, around: Surroundings
 ) -> Iterator[Group]:
     """Layers of lines of a colour [C], of which pixels are covered so far [H, W]."""

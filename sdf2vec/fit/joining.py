@@ -117,6 +117,13 @@ def inserted(scene: SceneTensors, layer: Group) -> SceneTensors:
     return replace(scene, groups=[*groups, layer])
 
 
+def topped(scene: SceneTensors, layers: Iterable[Group]) -> SceneTensors:
+    """The scene with layers on top, one above the other."""
+    for layer in layers:
+        scene = inserted(scene, replace(layer, order=torch.tensor([scene.layer_count])))
+    return scene
+
+
 @dataclass(frozen=True)
 class Worth:
     """How good a layer is: its error's logarithm, and a price for each of its numbers; the less the better."""
@@ -172,12 +179,12 @@ class Search:
     generator: torch.Generator
     tick: Tick
     pixel: float  # scene units: how thick shapes are at least
-    thin: bool = False  # whether lengths may be half of that
+    shortest: float | None = None  # scene units: of lengths; as thick as shapes are where it is not said
 
     @property
     def least(self) -> float:
         """Scene units: the least length."""
-        return 0.5 * self.pixel if self.thin else self.pixel
+        return self.pixel if self.shortest is None else self.shortest
 
     def joined(self, layer: Group, around: Surroundings, most: int) -> tuple[list[Tried], int]:
         """The best few with shapes joined, to a layer or to one begun anew, while that helps.
@@ -265,10 +272,16 @@ class Search:
         (found,) = self.proposer(around).candidates([place], around)
         return sorted(found, key=lambda tried: tried.error)[:LIKELY]
 
+    @property
+    def kinds(self) -> tuple[str, ...]:
+        """What single shapes may be."""
+        return tuple(kind for kind in self.layers.kinds if KINDS[kind].patch is None)
+
     def proposer(self, around: Surroundings) -> Proposer:
         """What fits single shapes to masks."""
-        kinds = tuple(kind for kind in self.layers.kinds if KINDS[kind].patch is None)
-        return Proposer(kinds, self.layers.paint, self.generator, partial(self.numbers, around), self.tick)
+        return Proposer(
+            self.kinds, self.layers.paint, self.generator, partial(self.numbers, around), self.tick
+        )
 
     def _color(self, around: Surroundings) -> torch.Tensor:
         """The mean colour [1, 3] of what a layer should show."""

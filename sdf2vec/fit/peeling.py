@@ -20,7 +20,7 @@ from ..render.tensors import Group, SceneTensors
 from .areas import Area, Outlined, cover_at
 from .candidates import own_cover
 from .hairlines import hairlines
-from .joining import Search, inserted
+from .joining import Search, topped
 from .outlining import best_outlined
 from .region_graph import Regions
 from .surroundings import Surroundings, View
@@ -51,7 +51,7 @@ def peeled(scene: SceneTensors, views: Sequence[View], search: Search) -> SceneT
         return scene
     outlines = Outlines(scene, [Surroundings.of(scene, 0, view) for view in views], search)
     finest = outlines.around[-1]
-    found, parts = hairlines(regions, finest, search.proposer(finest))
+    found, parts = hairlines(regions, finest, search.kinds)
     regions = regions.hidden(parts)
     while len(found) < MOST and not outlines.are_hopeless and (top := outlines.topmost(regions)):
         found += [layer for each in top if not each.soft for layer in each.layers]
@@ -59,9 +59,7 @@ def peeled(scene: SceneTensors, views: Sequence[View], search: Search) -> SceneT
             regions = regions.hidden(np.any([each.overlay.inside for each in top], axis=0))
         else:
             regions = bared(regions, top[0].overlay)
-    for layer in reversed(found):
-        scene = inserted(scene, replace(layer, order=torch.tensor([scene.layer_count])))
-    return scene
+    return topped(scene, reversed(found))
 
 
 @dataclass(frozen=True)
@@ -102,13 +100,20 @@ class Outlines:
         for overlay in tried:
             if self.are_hopeless:
                 break
-            own = regions.extent(overlay.inside)
-            best = self._within(own, overlay, regions)
-            if best is not None and self._hides_more(best, regions):  # than is seen around its own place
-                best = self._within(self._everywhere, overlay, regions)
-            if best is not None and not self._hides_more(best, regions):
-                found.append(best)
+            best = self._told(overlay, regions)
+            found += [best] if best is not None else []
         return found
+
+    def _told(self, overlay: Overlay, regions: Regions) -> Outlined | None:
+        """What has the outline of an overlay; looked for in all of the picture where that hides what is not seen around
+        its own place.
+        """
+        height, width = self.around[-1].shape
+        for part in (regions.extent(overlay.inside), (slice(0, height), slice(0, width))):
+            best = self._within(part, overlay, regions)
+            if best is None or not self._hides_more(best, regions):
+                return best
+        return None
 
     def _within(self, part: Part, overlay: Overlay, regions: Regions) -> Outlined | None:
         """What has the outline of an overlay, as seen in a part of the picture and around it."""
@@ -122,14 +127,8 @@ class Outlines:
     def _hides_more(self, best: Outlined, regions: Regions) -> bool:
         """Whether layers cover the greater part of a region that they do not belong to."""
         whole = self.around[-1]
-        covered = whole.plane(cover_at(best.all, whole) > 0.5)
-        hidden = np.bincount(regions.labels[covered], minlength=len(regions.areas) + 1)[1:]
+        hidden = regions.count(whole.plane(cover_at(best.all, whole) > 0.5))
         return bool(((hidden > HIDDEN * regions.areas) & ~best.overlay.inside).any())
-
-    @property
-    def _everywhere(self) -> Part:
-        height, width = self.around[-1].shape
-        return slice(0, height), slice(0, width)
 
     def _of(self, area: Area, fine: Area) -> Outlined | None:
         """The shape that comes nearest to an overlay, or a shape with another cut out of it; None for no pixel."""
@@ -191,7 +190,7 @@ def _goes_on(layer: Group, fine: Area, regions: Regions, is_ground: BoolArray) -
     of a shape that lies on it, or under it. Not where all that they cut off is ground [R]: many shapes may end there.
     """
     labels, around = regions.labels[fine.part], fine.around
-    ground = np.concatenate([[False], is_ground])[labels]
+    ground = regions.place(is_ground)[fine.part]
     base, *others = (
         around.plane(own_cover(layer, index, around) > 0.5) for index in range(len(layer.structure))
     )

@@ -75,7 +75,11 @@ class Regions:
     @cached_property
     def areas(self) -> IntArray:
         """Pixels of each, [R]."""
-        return np.bincount(self.labels.ravel(), minlength=len(self.colors) + 1)[1:]
+        return self.count(np.ones(self.labels.shape, bool))
+
+    def count(self, where: BoolArray) -> IntArray:
+        """Pixels of each somewhere [H, W], [R]."""
+        return np.bincount(self.labels[where], minlength=len(self.colors) + 1)[1:]
 
     @property
     def sides(self) -> Sides:
@@ -90,7 +94,11 @@ class Regions:
 
     def mask(self, chosen: BoolArray, part: Part) -> BoolArray:
         """Where some of them [R] surely are, in a part of the picture."""
-        return np.concatenate([[False], chosen])[self.labels[part]] & self.sure[part]
+        return self.place(chosen)[part] & self.sure[part]
+
+    def place(self, chosen: BoolArray) -> BoolArray:
+        """Where some of them [R] are or may be, [H, W]."""
+        return np.asarray(np.concatenate([[False], chosen])[self.labels])
 
     def extent(self, chosen: BoolArray) -> Part:
         """The part of the picture that some of them [R] surely are in."""

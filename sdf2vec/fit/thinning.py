@@ -12,7 +12,7 @@ from ..image import Picture
 from ..render.tensors import SceneTensors, from_scene, to_scene
 from ..scene import Scene
 from ..threads import threads_of_its_own
-from .constraints import count_shorter
+from .constraints import least_length
 from .descents import descended
 from .draw_order import without, without_all
 from .initialization import Layers
@@ -43,8 +43,8 @@ def thinned(
 
     layers = Layers(settings.kinds, scene.compositing)
     tensors = from_scene(scene)
-    generator, thin = torch.Generator(), bool(count_shorter(tensors, scene.pixel))
-    search = Search(layers, preset_of(settings).falloff, generator, tick, scene.pixel, thin)
+    generator, least = torch.Generator(), least_length(tensors, scene.pixel)
+    search = Search(layers, preset_of(settings).falloff, generator, tick, scene.pixel, least)
     view = view_of(picture.premultiplied, settings, RESOLUTION)
     is_small = tensors.layer_count <= FEW
     with threads_of_its_own(), suppress(Stopped):

@@ -8,6 +8,7 @@ from sdf2vec.fit.joining import Search
 from sdf2vec.fit.shading import Shading
 from sdf2vec.fit.surroundings import View
 from sdf2vec.image import Picture, resize
+from sdf2vec.render.tensors import SceneTensors
 from sdf2vec.scene import Layer, Shape
 
 WHITE, BLUE, RED, GREEN = (
@@ -52,6 +53,11 @@ def ramp(rise=RISE):
 
 def view_of(pixels):
     return View(torch.from_numpy(np.ascontiguousarray(pixels.transpose(2, 0, 1))).float(), None)
+
+
+def bare():
+    """A white square without layers."""
+    return SceneTensors([], torch.tensor([*WHITE, 1.0]).float(), "over", (1.0, 1.0))
 
 
 def search_of():

@@ -2,24 +2,24 @@
 
 import numpy as np
 import pytest
-import torch
 
 from sdf2vec import fit
 from sdf2vec.api import render
 from sdf2vec.fit.constraints import least_length
 from sdf2vec.fit.hairlines import hairlines
+from sdf2vec.fit.joining import topped
 from sdf2vec.fit.peeling import peeled
 from sdf2vec.fit.region_graph import Regions
 from sdf2vec.fit.surroundings import Surroundings
 from sdf2vec.image import Picture
-from sdf2vec.render.tensors import SceneTensors, from_scene, to_scene
+from sdf2vec.render.tensors import from_scene, to_scene
 from sdf2vec.scene import Scene
 from tests.fit.drawn import (
     BLUE,
     GREEN,
     RED,
     SIDE,
-    WHITE,
+    bare,
     box,
     disc,
     painted,
@@ -44,13 +44,10 @@ def line(x0, y0, x1, y1, width):
 def told(pixels):
     """The layers of a picture's hairlines, from the bottom up, and how many regions are parts of them."""
     regions = Regions.of(pixels)
-    bare = SceneTensors([], torch.tensor([*WHITE, 1.0]).float(), "over", (1.0, 1.0))
-    around = Surroundings.of(bare, 0, view_of(pixels))
-    groups, parts = hairlines(regions, around, search_of().proposer(around))
-    scenes = [
-        to_scene(SceneTensors([group], bare.background, "over", (1.0, 1.0)), SIDE, SIDE) for group in groups
-    ]
-    return [scene.layers[0] for scene in reversed(scenes)], int(parts.sum())
+    around = Surroundings.of(bare(), 0, view_of(pixels))
+    groups, parts = hairlines(regions, around, search_of().kinds)
+    scene = to_scene(topped(bare(), reversed(groups)), SIDE, SIDE)
+    return list(scene.layers), int(parts.sum())
 
 
 def ends_of(layer):
@@ -118,8 +115,7 @@ def test_what_is_no_line_is_left(pixels):
 def test_a_picture_of_thin_lines_is_taken_apart():
     """Its rest, too: what lies under the lines has its outline."""
     pixels = painted((box(20, 20, 76, 70), GREEN, 1.0), (line(8, 90, 90, 8, 1.5), RED, 1.0))
-    bare = SceneTensors([], torch.tensor([*WHITE, 1.0]).float(), "over", (1.0, 1.0))
-    layers = to_scene(peeled(bare, [view_of(pixels)], search_of()), SIDE, SIDE).layers
+    layers = to_scene(peeled(bare(), [view_of(pixels)], search_of()), SIDE, SIDE).layers
     assert [layer.shapes[0].color for layer in layers] == [
         pytest.approx(GREEN, abs=0.01),
         pytest.approx(RED, abs=0.1),

@@ -6,7 +6,6 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-import torch
 
 from sdf2vec.api import render
 from sdf2vec.fit import descents, peeling, pruning, sparse
@@ -19,7 +18,7 @@ from sdf2vec.fit.surroundings import Surroundings, View, error_of
 from sdf2vec.fit.transparency import Overlay, bared, overlays
 from sdf2vec.fit.views import scaled
 from sdf2vec.image import Picture
-from sdf2vec.render.tensors import SceneTensors, from_scene, to_scene
+from sdf2vec.render.tensors import from_scene, to_scene
 from sdf2vec.scene import Joint, Layer, Scene
 from tests.fit.drawn import (
     BLUE,
@@ -28,6 +27,7 @@ from tests.fit.drawn import (
     RED,
     SIDE,
     WHITE,
+    bare,
     box,
     disc,
     painted,
@@ -42,9 +42,8 @@ from tests.fit.drawn import (
 
 def apart(pixels, *sides):
     """The layers that are told by their outlines, from the bottom up; where the picture is seen at these sizes, too."""
-    bare = SceneTensors([], torch.tensor([*WHITE, 1.0]).float(), "over", (1.0, 1.0))
     small = [View(scaled(pixels.astype(np.float32), side), None) for side in sides]
-    return to_scene(peeled(bare, [*small, view_of(pixels)], search_of()), SIDE, SIDE).layers
+    return to_scene(peeled(bare(), [*small, view_of(pixels)], search_of()), SIDE, SIDE).layers
 
 
 # --- regions ------------------------------------------------------------------------------------------------
@@ -211,9 +210,8 @@ def test_a_hole_of_another_shape_is_seen_where_the_picture_is_large():
     hole = (np.minimum(abs(x - 48), abs(y - 48)) < 8) & (np.maximum(abs(x - 48), abs(y - 48)) < 22)
     picture = Picture(painted((disc(48, 48, 38) & ~hole, GREEN, 1.0)).astype(np.float32))
     sizes = [View(scaled(picture.premultiplied, side), None) for side in (28, SIDE)]
-    bare = SceneTensors([], torch.tensor([*WHITE, 1.0]).float(), "over", (1.0, 1.0))
-    assert peeled(bare, sizes[:1], search_of()).layer_count == 1
-    assert peeled(bare, sizes, search_of()).layer_count == 0
+    assert peeled(bare(), sizes[:1], search_of()).layer_count == 1
+    assert peeled(bare(), sizes, search_of()).layer_count == 0
 
 
 def sector(first, last, radius, hole=0):
@@ -256,12 +254,9 @@ def test_a_pie_is_a_layer_for_each_of_its_slices():
 
 def goes_on(pixels, color, *shapes):
     """Whether what leaves a part of a shape has edges beyond it, in the region of a colour."""
-    regions, bare = (
-        Regions.of(pixels),
-        SceneTensors([], torch.tensor([*WHITE, 1.0]).float(), "over", (1.0, 1.0)),
-    )
+    regions, scene = Regions.of(pixels), bare()
     inside = np.abs(regions.colors - color).max(axis=1) < 0.02
-    outlines = peeling.Outlines(bare, [Surroundings.of(bare, 0, view_of(pixels))], search_of())
+    outlines = peeling.Outlines(scene, [Surroundings.of(scene, 0, view_of(pixels))], search_of())
     _, fine = outlines._areas(regions.extent(inside), Overlay(1.0, color, inside, ~inside), regions)
     layer = Layer(shapes, joints=(Joint("intersection"),))
     (group,) = from_scene(Scene(SIDE, SIDE, (layer,), (1.0, 1.0, 1.0))).groups
