@@ -2,15 +2,17 @@
 
 import numpy as np
 import pytest
+import torch
 
 from sdf2vec import fit
 from sdf2vec.api import render
 from sdf2vec.fit.constraints import least_length
+from sdf2vec.fit.descents import Sizes, fine_enough
 from sdf2vec.fit.hairlines import hairlines
 from sdf2vec.fit.joining import topped
 from sdf2vec.fit.peeling import peeled
 from sdf2vec.fit.region_graph import Regions
-from sdf2vec.fit.surroundings import Surroundings
+from sdf2vec.fit.surroundings import Surroundings, View
 from sdf2vec.image import Picture
 from sdf2vec.render.tensors import from_scene, to_scene
 from sdf2vec.scene import Scene
@@ -105,8 +107,12 @@ def test_a_line_that_is_partly_a_region_is_one():
         painted((box(20, 20, 70, 60), BLUE, 1.0), (disc(60, 60, 20), RED, 1.0)),
         painted((disc(30, 30, 1.2), BLUE, 1.0), (disc(60, 50, 1.5), BLUE, 1.0)),
         np.where(np.random.default_rng(0).random((SIDE, SIDE, 1)) < 0.1, 0.0, np.ones((SIDE, SIDE, 3))),
+        painted(
+            (line(10, 4, 80, 4, 1.5), RED, 1.0),
+            (((X % 8 - 4) ** 2 + (Y % 8 - 4) ** 2 < 3) & (Y > 12), BLUE, 1.0),
+        ),
     ],
-    ids=["wide shapes", "dots", "noise"],
+    ids=["wide shapes", "dots", "noise", "a line among dots"],
 )
 def test_what_is_no_line_is_left(pixels):
     assert told(pixels) == ([], 0)
@@ -132,7 +138,7 @@ def test_lengths_may_be_less_than_a_pixel_where_some_are():
 
 
 def test_a_chart_is_its_lines():
-    """Where all descend at half the size, nothing of them is left."""
+    """As wide as they are: lines of less than two pixels would be made wider."""
     pixels = painted(
         (line(14, 8, 14, 80, 1.2), (0.2, 0.2, 0.2), 1.0),
         (line(14, 80.3, 90, 80.3, 1.2), (0.2, 0.2, 0.2), 1.0),
@@ -142,3 +148,13 @@ def test_a_chart_is_its_lines():
     scene = fit(Picture(pixels.astype(np.float32)), seed=0)
     assert [shape.kind for layer in scene.layers for shape in layer.shapes] == ["box"] * 4
     assert -10 * np.log10(np.mean((render(scene) - pixels) ** 2)) > 38
+
+
+@pytest.mark.parametrize(("width", "is_fine"), [(1.5, True), (8.0, False)])
+def test_all_descend_where_thin_lines_are_seen(width, is_fine):
+    views = [View(torch.zeros(3, side, side), None) for side in (24, 48, SIDE)]
+    layers = tuple(sharp_box(BLUE, 10, top, 80, top + width) for top in (20, 50))
+    scene = from_scene(Scene(SIDE, SIDE, layers, (1.0, 1.0, 1.0)))
+    sizes, search = fine_enough(Sizes(*views), search_of(), scene)
+    assert sizes.joint is (views[2] if is_fine else views[1])
+    assert search.least * SIDE == pytest.approx(0.5 if is_fine else 1.0)
