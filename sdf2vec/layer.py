@@ -21,9 +21,10 @@ from .blend import COMPOSITING, JOINS, coverage, reach, saturation, union_reach
 from .expr import Expr, Operand, const, maximum, minimum, var, vec3, vec4
 from .function import let
 from .graph import scalarize
+from .kind import Kind
 from .operation import VEC2
 from .paints import FLAT, PAINTS, Paint
-from .shapes import KINDS, Kind
+from .shapes import KINDS
 from .units import FALLOFF, OPACITY, SMOOTHNESS, Parameter
 
 ROW_OPACITY = 1  # place of the opacity among `Formula.uniforms`

@@ -34,4 +34,16 @@ class PolygonOutline:
     rounding: float
 
 
-Outline = EllipseOutline | RectangleOutline | PolygonOutline
+@dataclass(frozen=True)
+class ArcOutline:
+    """What a round pen draws along an arc of a circle. `sagitta`: how far it is from the chord, to the right of who
+    goes from start to end on the screen.
+    """
+
+    start: Point
+    end: Point
+    sagitta: float
+    half_width: float
+
+
+Outline = EllipseOutline | RectangleOutline | PolygonOutline | ArcOutline

@@ -8,15 +8,12 @@ down, angles are in radians and turn clockwise on the screen.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
-from dataclasses import dataclass
 
 from .blend import CUTOFF
 from .expr import (
     Expr,
     absolute,
     clamp,
-    const,
     cos,
     dot,
     exp,
@@ -31,93 +28,16 @@ from .expr import (
     vec4,
 )
 from .function import function, let
+from .kind import SMALLEST, Frame, Kind, Patch, rotate
 from .operation import FLOAT, VEC2
-from .outlines import EllipseOutline, Outline, Point, PolygonOutline, RectangleOutline
-from .units import ANGLE, FREQUENCY, LENGTH, POSITION, Parameter
+from .outlines import ArcOutline, EllipseOutline, Outline, Point, PolygonOutline, RectangleOutline
+from .units import ANGLE, FREQUENCY, LENGTH, OFFSET, POSITION, Parameter
 
 PATCH_REACH = math.sqrt(
     2.0 * math.log(1.0 / CUTOFF)
 )  # standard deviations from which on a Gaussian counts as 0
 PIXEL_VARIANCE = 1.0 / 12.0  # of a box of one pixel
-SMALLEST = 1e-6  # scene units; keeps divisors away from 0 at zero size
 TINY = 1e-20  # the same for squared lengths
-
-
-# --- declarations -------------------------------------------------------------------------------------------
-
-
-@dataclass(frozen=True)
-class Frame:
-    """The coordinates in which a shape is painted: its middle, the direction of x, half its size; vec2 each."""
-
-    origin: Expr
-    axis: Expr
-    half: Expr
-
-    def at(self, p: Expr) -> Expr:
-        """A point of the scene in the frame, in which the shape reaches from about −1 to 1 along both axes."""
-        return rotate(p - self.origin, self.axis) / maximum(self.half, SMALLEST)
-
-
-@dataclass(frozen=True)
-class Patch:
-    """Coverage of its own instead of a soft edge: `cover(p, pixel, *parameters)`, 0 from the distance
-    `reach(pixel, *parameters)` on, within −1..1 where `signed`. `radial`: it only falls with the distance from the
-    middle of the shape's frame, measured in halves of its size.
-    """
-
-    cover: Callable[..., Expr]
-    reach: Callable[..., Expr]
-    signed: bool = False
-    radial: bool = False
-
-
-def _upright_frame(extent: Callable[..., Expr], *parameters: Expr) -> Frame:
-    """The box around a sharp shape."""
-    box = extent(const(0.0), *parameters)
-    low, high = vec2(box.x, box.y), vec2(box.z, box.w)
-    return Frame((low + high) * 0.5, vec2(1.0, 0.0), (high - low) * 0.5)
-
-
-@dataclass(frozen=True, eq=False)
-class Kind:
-    """A kind of shape.
-
-    `distance(p, *parameters)` is the signed distance, negative inside. `exact` says whether it is the true
-    Euclidean distance everywhere. `slope(*parameters)` bounds how fast it changes, which is 1 for a distance.
-    `extent(margin, *parameters)` is a box (low x, low y, high x, high y)
-    that holds every point with distance ≤ margin, for margin ≥ 0. `outline(offset, *parameters)` is the
-    contour at `distance = offset`, where it has a simple form. `area(*parameters)` is what it covers when sharp,
-    and `thickness(*parameters)` its least width; both may be those of a simpler shape near it. `frame(*parameters)`
-    is what it is painted in, the box around it unless told. A `patch` has coverage of its own; the distance then
-    only says where it is, and it can't be joined with others. A number `at_most` the least of another changes nothing
-    beyond it.
-    """
-
-    name: str
-    parameters: tuple[Parameter, ...]
-    distance: Callable[..., Expr]
-    extent: Callable[..., Expr]
-    area: Callable[..., Expr]
-    thickness: Callable[..., Expr]
-    exact: bool
-    outline: Callable[..., Outline] | None = None
-    slope: Callable[..., Expr] = lambda *parameters: const(1.0)
-    own_frame: Callable[..., Frame] | None = None
-    patch: Patch | None = None
-    at_most: tuple[tuple[str, str], ...] = ()
-
-    def frame(self, *parameters: Expr) -> Frame:
-        """What the shape is painted in."""
-        return self.own_frame(*parameters) if self.own_frame else _upright_frame(self.extent, *parameters)
-
-    def variables(self, suffix: str = "") -> tuple[Expr, ...]:
-        """One variable for each parameter."""
-        return tuple(parameter.variable(suffix) for parameter in self.parameters)
-
-    def scalars(self, suffix: str = "") -> tuple[Expr, ...]:
-        """The float variables behind `variables`, in the order of a flat parameter row."""
-        return tuple(scalar for parameter in self.parameters for scalar in parameter.scalars(suffix))
 
 
 def _position(name: str, start: Point = (0.0, 0.0)) -> Parameter:
@@ -133,12 +53,6 @@ def _angle(name: str) -> Parameter:
 
 
 # --- helpers ------------------------------------------------------------------------------------------------
-
-
-@function("rotate", p=VEC2, axis=VEC2)
-def rotate(p: Expr, axis: Expr) -> Expr:
-    """p in the frame whose x axis points along axis (cosine, sine)."""
-    return vec2(p.x * axis.x + p.y * axis.y, p.y * axis.x - p.x * axis.y)
 
 
 def _axis(angle: Expr) -> Expr:
@@ -305,6 +219,83 @@ def _triangle_outline(offset: float, a: Point, b: Point, c: Point) -> Outline:
     return PolygonOutline((a, b, c), offset)
 
 
+# --- arc ----------------------------------------------------------------------------------------------------
+
+
+def _along(chord: Expr, across: Expr) -> Expr:
+    """The direction of a chord of some length; to the right where it has none."""
+    return select(across < SMALLEST, vec2(1.0, 0.0), chord / maximum(across, SMALLEST))
+
+
+@function("sdArc", p=VEC2, a=VEC2, b=VEC2, sagitta=FLOAT, half_width=FLOAT)
+def sd_arc(p: Expr, a: Expr, b: Expr, sagitta: Expr, half_width: Expr) -> Expr:
+    """Exact distance to an arc of a circle from a to b, drawn with a round pen; no sagitta: a line.
+
+    The distance to the circle is that of Inigo Quilez' "2D distance functions", times (its radius + distance to its
+    middle) in numerator and denominator, so that nothing is infinite where it is flat.
+    """
+    chord = let("chord", b - a)
+    across = let("across", length(chord))
+    q = let("q", rotate(p - (a + b) * 0.5, _along(chord, across)))
+    c = let("c", 0.5 * across)
+    squares = let("squares", c * c + sagitta * sagitta)
+    bend = let("bend", 2.0 * sagitta / maximum(squares, TINY))
+    top = let("top", vec2(q.x, q.y - sagitta))
+    to_circle = (bend * dot(top, top) + 2.0 * top.y) / (1.0 + length(vec2(bend * top.x, bend * top.y + 1.0)))
+    end = let("end", vec2(absolute(q.x) - c, q.y))
+    beyond = end.x * (c * c - sagitta * sagitta) - end.y * (2.0 * c * sagitta)
+    # where both ends are one, all of the circle is there; where that is none, too, the ends alone
+    return select(beyond < SMALLEST * squares, absolute(to_circle), length(end)) - half_width
+
+
+def _arc_top(a: Expr, b: Expr, sagitta: Expr) -> tuple[Expr, Expr]:
+    """The middle of an arc, and the direction from its circle's middle to it."""
+    along = _along(b - a, length(b - a))
+    out = vec2(-along.y, along.x)
+    return (a + b) * 0.5 + out * sagitta, out * select(sagitta < 0.0, -1.0, 1.0)
+
+
+def _arc_extent(margin: Expr, a: Expr, b: Expr, sagitta: Expr, half_width: Expr) -> Expr:
+    """Around both ends, and where the circle reaches farthest up, down or to a side, if that is within the arc."""
+    top, out = _arc_top(a, b, sagitta)
+    c, rise = 0.5 * length(b - a), absolute(sagitta)
+    squares = c * c + rise * rise
+    radius = squares / maximum(2.0 * rise, TINY)
+
+    def reach(first: Expr, last: Expr, middle: Expr, out: Expr) -> Expr:
+        farthest = middle + minimum(radius * (1.0 - out), rise)
+        ends = maximum(first, last)
+        return select(out * squares < c * c - rise * rise, ends, maximum(ends, farthest))
+
+    grown = half_width + margin
+    right, left = reach(a.x, b.x, top.x, out.x), -reach(-a.x, -b.x, -top.x, -out.x)
+    below, above = reach(a.y, b.y, top.y, out.y), -reach(-a.y, -b.y, -top.y, -out.y)
+    return vec4(left - grown, above - grown, right + grown, below + grown)
+
+
+def _arc_area(a: Expr, b: Expr, sagitta: Expr, half_width: Expr) -> Expr:
+    """That of a pen along a parabola of so many lengths (Huygens), about: of a whole circle 0.74 times as many."""
+    chord = b - a
+    along = sqrt(dot(chord, chord) + (16.0 / 3.0) * sagitta * sagitta)
+    return half_width * (2.0 * along + math.pi * half_width)
+
+
+def _arc_thickness(a: Expr, b: Expr, sagitta: Expr, half_width: Expr) -> Expr:
+    return 2.0 * half_width
+
+
+def _arc_frame(a: Expr, b: Expr, sagitta: Expr, half_width: Expr) -> Frame:
+    """Along the chord, around the arc unless it is more than half a circle."""
+    across = length(b - a)
+    along = _along(b - a, across)
+    middle = (a + b + vec2(-along.y, along.x) * sagitta) * 0.5
+    return Frame(middle, along, vec2(0.5 * across, 0.5 * absolute(sagitta)) + half_width)
+
+
+def _arc_outline(offset: float, a: Point, b: Point, sagitta: float, half_width: float) -> Outline:
+    return ArcOutline(a, b, sagitta, half_width + offset)
+
+
 # --- displaced circle ---------------------------------------------------------------------------------------
 
 
@@ -444,6 +435,22 @@ KINDS: dict[str, Kind] = {
             _triangle_thickness,
             exact=True,
             outline=_triangle_outline,
+        ),
+        Kind(
+            "arc",
+            (
+                _position("a", (-1.2, 0.4)),
+                _position("b", (1.2, 0.4)),
+                Parameter("sagitta", OFFSET, (-0.8,)),
+                _size("half_width", 0.3),
+            ),
+            sd_arc,
+            _arc_extent,
+            _arc_area,
+            _arc_thickness,
+            exact=True,
+            outline=_arc_outline,
+            own_frame=_arc_frame,
         ),
         Kind(
             "displaced",

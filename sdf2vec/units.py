@@ -191,6 +191,11 @@ def _keep_length(values: Any, positive: bool, room: Room) -> None:
     values.clamp_(room.pixel if positive else 0.0, LONGEST * max(room.size))
 
 
+def _keep_offset(values: Any, positive: bool, room: Room) -> None:
+    longest = LONGEST * max(room.size)
+    values.clamp_(-longest, longest)
+
+
 def _keep_angle(values: Any, positive: bool, room: Room) -> None:
     values.remainder_(math.tau)
 
@@ -247,6 +252,10 @@ def _share_of_span(v: Expr, of: Fractions) -> Expr:
     return length(of.box) * v
 
 
+def _signed_share_of_span(v: Expr, of: Fractions) -> Expr:
+    return length(of.box) * (2.0 * v - 1.0)
+
+
 def _between(unit: str) -> Callable[[Expr, Fractions], Expr]:
     """A value between the least and the largest of the scene."""
 
@@ -291,6 +300,17 @@ POSITION = Unit(
 )
 LENGTH = Unit(
     "length", 0.0, LONGEST_CANVAS, 0.003, _keep_length, _SPAN, _start_length, scaling=1, crowded=True
+)
+OFFSET = Unit(  # a length to one side or the other
+    "offset",
+    -LONGEST_CANVAS,
+    LONGEST_CANVAS,
+    0.006,
+    _keep_offset,
+    Codec(_signed_share_of_span),
+    _start_length,
+    scaling=1,
+    crowded=True,
 )
 ANGLE = Unit("angle", -1000.0, 1000.0, 0.03, _keep_angle, _TURN, _start_angle)
 FREQUENCY = Unit(

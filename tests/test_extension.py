@@ -22,6 +22,7 @@ from sdf2vec.fit.constraints import project
 from sdf2vec.fit.initialization import Layers, place
 from sdf2vec.fit.presets import Start
 from sdf2vec.function import function
+from sdf2vec.kind import Kind, rotate
 from sdf2vec.layer import Part
 from sdf2vec.operation import FLOAT, VEC4
 from sdf2vec.paints import PAINTS, Paint
@@ -29,7 +30,7 @@ from sdf2vec.render import culled, fused, reference, triton_fused
 from sdf2vec.render.tensors import from_scene, to_scene
 from sdf2vec.roundtrip import ROUND_TRIPS, compare
 from sdf2vec.scene import Joint
-from sdf2vec.shapes import KINDS, Kind, rotate
+from sdf2vec.shapes import KINDS
 from sdf2vec.units import ANGLE, COLOR, FREQUENCY, LENGTH, POSITION, Parameter
 from tests.export.test_component import assert_shows, module
 from tests.triton_device import DEVICE

@@ -12,7 +12,7 @@ from sdf2vec.expr import const, var
 from sdf2vec.graph import components_of, gradient, scalarize
 from sdf2vec.lower.torch import compile_torch
 from sdf2vec.operation import VEC2
-from sdf2vec.outlines import EllipseOutline, PolygonOutline, RectangleOutline
+from sdf2vec.outlines import ArcOutline, EllipseOutline, PolygonOutline, RectangleOutline
 from sdf2vec.scene import Shape
 from sdf2vec.shapes import KINDS
 
@@ -41,6 +41,16 @@ BY_HAND = [
     ("triangle", (0.0, 3.0, 4.0, 0.0, 0.0, 0.0), (1.0, 1.0), -1.0),  # the other way round
     ("triangle", (0.0, 0.0, 2.0, 0.0, 1.0, 0.0), (1.0, 3.0), 3.0),  # flat: the distance to a line
     ("triangle", (1.0, 1.0, 1.0, 1.0, 1.0, 1.0), (4.0, 5.0), 5.0),  # a point
+    ("arc", (-1.0, 0.0, 1.0, 0.0, -1.0, 0.1), (0.0, -3.0), 1.9),  # the upper half of the unit circle
+    ("arc", (-1.0, 0.0, 1.0, 0.0, -1.0, 0.1), (0.0, 0.0), 0.9),
+    ("arc", (-1.0, 0.0, 1.0, 0.0, -1.0, 0.1), (0.6, -0.8), -0.1),
+    ("arc", (-1.0, 0.0, 1.0, 0.0, -1.0, 0.1), (1.0, 2.0), 1.9),  # below an end
+    ("arc", (1.0, 0.0, -1.0, 0.0, -1.0, 0.1), (0.0, 3.0), 1.9),  # from the other end it is the lower half
+    ("arc", (0.0, -1.0, -1.0, 0.0, -1.0 - DIAGONAL, 0.0), (3.0, 4.0), 4.0),  # three quarters of the circle
+    ("arc", (0.0, -1.0, -1.0, 0.0, -1.0 - DIAGONAL, 0.0), (-3.0, -3.0), math.hypot(3.0, 2.0)),  # the gap
+    ("arc", (0.0, -0.2, 0.0, 0.2, 0.0, 0.1), (0.3, 0.6), 0.4),  # straight
+    ("arc", (0.3, 0.3, 0.3, 0.3, 0.0, 0.1), (3.3, 4.3), 4.9),  # a dot
+    ("arc", (0.0, 0.0, 0.0, 0.0, 2.0, 0.0), (0.0, 5.0), 3.0),  # both ends are one: a ring around (0, 1)
     ("displaced", (0.0, 0.0, 1.0, 0.25, math.pi, math.pi), (0.5, 0.5), DIAGONAL - 1.25),
     ("displaced", (0.0, 0.0, 1.0, 0.25, math.pi, math.pi), (3.0, 4.0), 4.0),
     ("displaced", (0.2, 0.0, 1.0, 0.0, 9.0, 7.0), (0.2, 2.0), 1.0),
@@ -54,6 +64,7 @@ TYPICAL = {
     "ellipse": (0.1, -0.2, 0.4, 0.15, 0.6),
     "box": (0.1, -0.2, 0.4, 0.2, 0.6, 0.05),
     "triangle": (0.0, -0.3, 0.4, 0.2, -0.3, 0.1),
+    "arc": (0.0, -0.3, 0.4, 0.2, 0.25, 0.08),
     "displaced": (0.1, -0.2, 0.3, 0.05, 12.0, 9.0),
     "gaussian": (0.1, -0.2, 0.4, 0.15, 0.6),
     "gabor": (0.1, -0.2, 0.4, 0.15, 0.6, 12.0, 1.0),
@@ -147,8 +158,8 @@ def test_no_nan_in_values_or_derivatives(kind, factor, dtype):
 
 def random_parameters(kind, numbers):
     """Any shape of moderate size, from numbers in 0..1."""
-    lowest = {"position": -0.8, "length": 0.01, "angle": -7.0, "frequency": -40.0}
-    highest = {"position": 0.8, "length": 0.5, "angle": 7.0, "frequency": 40.0}
+    lowest = {"position": -0.8, "length": 0.01, "offset": -0.5, "angle": -7.0, "frequency": -40.0}
+    highest = {"position": 0.8, "length": 0.5, "offset": 0.5, "angle": 7.0, "frequency": 40.0}
     units = [p.unit.name for p in KINDS[kind].parameters for _ in p.start]
     return tuple(lowest[u] + n * (highest[u] - lowest[u]) for n, u in zip(numbers, units, strict=False))
 
@@ -205,6 +216,9 @@ def outline_points(outline):
                 ],
                 axis=1,
             )
+        case ArcOutline(start, end, sagitta, half):
+            angle, center = 0.0, (0.0, 0.0)
+            local = np.concatenate([arc_points(start, end, sagitta, off) for off in (half, -half)]).T
         case PolygonOutline(corners, rounding):
             angle, center = 0.0, (0.0, 0.0)
             ends = zip(corners, corners[1:] + corners[:1], strict=True)
@@ -215,6 +229,19 @@ def outline_points(outline):
             local = np.concatenate([side + _outward(side, corners) * rounding for side in sides]).T
     c, s = math.cos(angle), math.sin(angle)
     return np.stack([c * local[0] - s * local[1] + center[0], s * local[0] + c * local[1] + center[1]])
+
+
+def arc_points(start, end, sagitta, off):
+    """Points so far beside an arc, by its circle's middle and angles."""
+    a, b = np.array(start), np.array(end)
+    middle, half = (a + b) / 2, np.linalg.norm(b - a) / 2
+    out = np.array([a[1] - b[1], b[0] - a[0]]) / (2 * half)
+    circle = middle + out * (sagitta**2 - half**2) / (2 * sagitta)
+    first, top, last = (np.arctan2(*(p - circle)[::-1]) for p in (a, middle + out * sagitta, b))
+    turns = np.concatenate(
+        [np.linspace(top, top + math.remainder(side - top, math.tau), 9) for side in (first, last)]
+    )
+    return circle + (np.linalg.norm(a - circle) + off) * np.stack([np.cos(turns), np.sin(turns)], axis=1)
 
 
 def _outward(side, corners):

@@ -16,9 +16,9 @@ from sdf2vec import (
     export,
     loads,
 )
+from sdf2vec.kind import Kind
 from sdf2vec.paints import PAINTS, Paint
 from sdf2vec.scene import MAX_JOINED, MAX_SHAPES
-from sdf2vec.shapes import Kind
 from sdf2vec.units import COLOR, DIRECTION, LENGTH, OPACITY, POSITION, Parameter
 from tests.scene.malformed import (
     ABSENT,

@@ -17,7 +17,7 @@ import numpy as np
 from ...arrays import BoolArray, Float64Array
 from ...blend import EDGE_DEVIATION
 from ...deferred import deferred
-from ...outlines import Outline
+from ...outlines import EllipseOutline, Outline
 from ...scene import Layer
 from .canvas import Canvas
 from .isobands import contours
@@ -66,17 +66,24 @@ def best_blur(layer: Layer, canvas: Canvas) -> Blurred | None:
     outline = edge_of(layer, 0.5)
     if outline is None:
         return best_traced(layer, canvas)
-    if core(outline) is None:
+    if isinstance(outline, EllipseOutline):
         return None
     trial = trial_of(layer, canvas)
-    made = [sharpened(outline, share) for share in SHARES]
-    edges = [(sharp, distance_to(sharp, trial.grid)) for sharp in made]
+    edges = _edges(outline, layer, trial.grid)
     usual = trial.deviation(1.0)
     blurs = [trial.judged(*tried, usual) for tried in edges]
     best, edge = min(zip(blurs, edges, strict=True), key=lambda pair: pair[0].error)
     others = sorted({trial.deviation(width) for width in WIDTHS} - {usual})
     plain = trial.judged(outline, edges[0][1], 0.0)
     return nearest([plain, best, *(trial.judged(*edge, other) for other in others)])
+
+
+def _edges(outline: Outline, layer: Layer, grid: SampleGrid) -> list[tuple[Outline, Float64Array]]:
+    """An outline with corners ever sharper, if it has any, and the distances [Y, X] to them."""
+    if core(outline) is None:
+        return [(outline, distances(layer, grid) - 0.5 * layer.falloff)]
+    made = [sharpened(outline, share) for share in SHARES]
+    return [(sharp, distance_to(sharp, grid)) for sharp in made]
 
 
 def best_traced(layer: Layer, canvas: Canvas, deviation: float | None = None) -> Blurred | None:

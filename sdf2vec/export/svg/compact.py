@@ -20,7 +20,7 @@ from ...render.occlusion import showing
 from ...scene import Layer, Scene
 from .blur import best_traced, trial_of
 from .canvas import Canvas, Points, pairs
-from .display import Drawing, Figure, Geometry, Group, Item, Path
+from .display import Contour, Drawing, Figure, Geometry, Group, Item, Path, Stroke
 from .outlines import Traced, core, distance_to, edge_of, placed
 from .refit_appearance import HASTY, Difference, refitted
 from .sampling import distances
@@ -31,7 +31,8 @@ from .visibility import LayerSamples, contrasts, layers_at
 # User units or, if that is more, pixels of the fitted picture that a traced contour may be off.
 TOLERANCE = 0.5, 0.15
 STRAYED = 0.2  # of a contour's tolerance, that curves are off: the root of the mean square
-RECTANGLE, THIN = 4, 1.0  # corners; user units that it is wide where it is a line
+RECTANGLE, LINE = 4, 2  # points
+THIN = 1.0  # user units that a rectangle is wide where it is a line
 ROUNDED = 1.0 / 12.0  # mean squared change of a number that is rounded to a whole one
 
 
@@ -114,6 +115,8 @@ def _squared_move(geometry: Geometry, canvas: Canvas) -> float:
         return (STRAYED * _tolerance(canvas)) ** 2 + ROUNDED
     if isinstance(geometry, PolygonOutline):
         numbers = np.array(geometry.points)
+    elif isinstance(geometry, Stroke):
+        numbers = np.array([geometry.line.start, *geometry.line.points])
     elif isinstance(geometry, EllipseOutline):
         numbers = np.array([*geometry.center, *geometry.radii])
     else:
@@ -138,9 +141,8 @@ def _blurred(layer: Layer, canvas: Canvas) -> tuple[Geometry, Difference | None]
     if outline is None:
         return _traced(layer, canvas)
     trial = trial_of(layer, canvas)
-    if isinstance(outline, EllipseOutline):
-        distance = distances(layer, trial.grid) - 0.5 * layer.falloff
-    else:
+    distance = distances(layer, trial.grid) - 0.5 * layer.falloff
+    if core(outline) is not None:
         distance = distance_to(outline, trial.grid)
     return _whole(outline, canvas), trial.judged(outline, distance, _deviation(layer)).difference.coarse()
 
@@ -161,13 +163,17 @@ def _tolerance(canvas: Canvas) -> float:
 
 
 def _whole(outline: Outline, canvas: Canvas) -> Geometry:
-    """An outline in user units, of a polygon and a rounding or an ellipse with radii of one unit or more."""
+    """An outline in user units: a polygon and a rounding, a stroke, an ellipse with radii of one unit or more."""
     if (made := core(outline)) is not None:
         points, rounding = made
-        return PolygonOutline(pairs(_thinned(canvas.places(points))), rounding * canvas.unit)
+        corners = pairs(_thinned(canvas.places(points)))
+        if len(corners) == LINE:
+            return Stroke(Contour.straight(corners), 2.0 * rounding * canvas.unit)
+        return PolygonOutline(corners, rounding * canvas.unit)
     geometry = placed(outline, canvas)
-    assert isinstance(geometry, EllipseOutline)
-    return replace(geometry, radii=(max(geometry.radii[0], 1.0), max(geometry.radii[1], 1.0)))
+    if isinstance(geometry, EllipseOutline):
+        return replace(geometry, radii=(max(geometry.radii[0], 1.0), max(geometry.radii[1], 1.0)))
+    return geometry
 
 
 def _thinned(points: Points) -> Points:
@@ -180,7 +186,10 @@ def _thinned(points: Points) -> Points:
 
 
 def _rounded(geometry: Geometry, canvas: Canvas) -> Geometry:
-    """Corners as they will be written; the writer rounds other numbers."""
+    """Corners and ends as they will be written; the writer rounds other numbers."""
+    if isinstance(geometry, Stroke) and geometry.line.is_straight:
+        ends = canvas.rounded(np.array([geometry.line.start, *geometry.line.points]))
+        return replace(geometry, line=Contour.straight(pairs(ends)))
     if not isinstance(geometry, PolygonOutline):
         return geometry
     return replace(geometry, points=pairs(canvas.rounded(np.array(geometry.points))))

@@ -7,7 +7,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
 from functools import cache
 from itertools import pairwise
 from typing import cast
@@ -18,12 +17,13 @@ from ...arrays import BoolArray, Float64Array
 from ...blend import JOINS, SHARPEST
 from ...expr import const, var, vec3, vec4
 from ...lower.numpy import compile_numpy
-from ...outlines import EllipseOutline, Outline, Point
+from ...outlines import EllipseOutline, Outline
 from ...scene import Layer
-from .canvas import Canvas, Points, growing
-from .display import Arc, Contour, Path, Segment
+from .canvas import Canvas, Points
+from .display import Path
 from .isobands import seen
 from .outlines import convex, core, distance_at, edge_of, placed, sides
+from .pieces import Piece, arc, contour
 from .sampling import distance_of
 
 MOST = 16  # shapes
@@ -34,75 +34,6 @@ SHORTEST = 0.02  # user units of a part
 FARTHEST = 3.0  # times as far off as in the mean may a point be: joins of little smoothness round corners off
 TESTED = 24  # points of a line or an arc
 LOOKED_AT, SURELY = 40, 0.5  # points along the sides of what is seen; user units from an edge where they tell
-ROUND = math.tau - 1e-6  # a whole turn: two halves, as they are drawn whatever their rounded radius is
-# spans of an arc that are safe from the rounding of its radius; others are drawn as several
-WIDEST, AROUND = math.radians(150.0), (math.radians(210.0), math.radians(300.0))
-
-
-@dataclass(frozen=True, eq=False)
-class Piece:
-    """A line from `start` by `step`, or an arc: from `first` on by `span` radians of an ellipse's own angle."""
-
-    start: Points
-    step: Points
-    radii: Points | None = None
-    angle: float = 0.0
-    first: float = 0.0
-    span: float = 0.0
-
-    def at(self, shares: Float64Array) -> Points:
-        """Points [N, 2] at shares 0..1 of it."""
-        if self.radii is None:
-            return np.asarray(self.start + shares[:, None] * self.step)
-        t = self.first + shares * self.span
-        x, y = self.radii[0] * np.cos(t), self.radii[1] * np.sin(t)
-        cosine, sine = math.cos(self.angle), math.sin(self.angle)
-        return np.stack([x * cosine - y * sine, x * sine + y * cosine], axis=1) + self.start
-
-    def part(self, begin: float, end: float) -> Piece:
-        """From one share to another, which may be the lesser."""
-        share = end - begin
-        if self.radii is None:
-            return Piece(self.start + begin * self.step, share * self.step)
-        first = self.first + begin * self.span
-        return Piece(self.start, self.step, self.radii, self.angle, first, share * self.span)
-
-    @property
-    def begin(self) -> Points:
-        return np.asarray(self.at(np.zeros(1))[0])
-
-    @property
-    def end(self) -> Points:
-        return np.asarray(self.at(np.ones(1))[0])
-
-    @property
-    def length(self) -> float:
-        """About."""
-        return float(np.linalg.norm(np.diff(self.at(np.linspace(0, 1, 9)), axis=0), axis=1).sum())
-
-    def goes_on_in(self, other: Piece) -> Piece | None:
-        """This and another one in one, if both are of one ellipse."""
-        if self.radii is None or other.radii is None or other.span * self.span < 0:
-            return None
-        is_same = np.array_equal(self.start, other.start) and np.array_equal(self.radii, other.radii)
-        if not is_same or abs(self.span + other.span) > math.tau + 1e-9:
-            return None
-        return Piece(self.start, self.step, self.radii, self.angle, self.first, self.span + other.span)
-
-    def segments(self, canvas: Canvas) -> Iterator[Segment]:
-        """What is drawn of it."""
-        if self.radii is None:
-            yield (_point(self.end, canvas),)
-            return
-        span, radii = abs(self.span), self.radii
-        count = 1 if span <= WIDEST or AROUND[0] <= span <= AROUND[1] else math.ceil(span / WIDEST)
-        if span > ROUND:
-            count, radii = 2, np.array([growing(radius, canvas.digits) for radius in radii.tolist()])
-        for end in np.arange(1, count + 1) / count:
-            to = _point(self.at(np.array([end]))[0], canvas)
-            yield Arc(
-                (float(radii[0]), float(radii[1])), self.angle, span / count > math.pi, self.span > 0, to
-            )
 
 
 def crossed(layer: Layer, canvas: Canvas, off: float) -> Path | None:
@@ -118,7 +49,7 @@ def crossed(layer: Layer, canvas: Canvas, off: float) -> Path | None:
     loops = _loops(kept)
     if not loops or not _is_outline(loops, layer, canvas, off):
         return None
-    return Path(tuple(_contour(loop, canvas) for loop in loops))
+    return Path(tuple(contour(loop, canvas) for loop in loops))
 
 
 def _outlines_of(layer: Layer) -> list[Outline] | None:
@@ -151,7 +82,7 @@ def _pieces(outline: Outline) -> list[Piece]:
         (across, down), angle = outline.radii, outline.angle
         if across < down:  # where it begins, its ends are farthest apart
             across, down, angle = down, across, angle + math.pi / 2
-        return [_arc(outline.center, (across, down), angle, 0.0, math.tau)]
+        return [arc(outline.center, (across, down), angle, 0.0, math.tau)]
     points, rounding = made
     corners = convex(points)
     if len(corners) < 3:
@@ -162,13 +93,8 @@ def _pieces(outline: Outline) -> list[Piece]:
         found.append(Piece(a + normal * rounding, b - a))
         first, last = (math.atan2(n[1], n[0]) for n in (normal, following))
         if rounding > 0:
-            found.append(_arc(b, (rounding, rounding), 0.0, first, (last - first) % math.tau))
+            found.append(arc(b, (rounding, rounding), 0.0, first, (last - first) % math.tau))
     return found
-
-
-def _arc(center: Points | Point, radii: Point, angle: float, first: float, span: float) -> Piece:
-    nowhere = np.zeros(2)
-    return Piece(np.array(center, np.float64), nowhere, np.array(radii, np.float64), angle, first, span)
 
 
 def _depths(outline: Outline, points: Points) -> Float64Array:
@@ -289,13 +215,3 @@ def _is_within(places: Points, polygons: Sequence[Points]) -> BoolArray:
                 crossing = a[0] + (places[:, 1] - a[1]) * (b[0] - a[0]) / (b[1] - a[1])
             is_odd ^= passes & (places[:, 0] < crossing)
     return is_odd
-
-
-def _contour(loop: Sequence[Piece], canvas: Canvas) -> Contour:
-    segments = tuple(segment for piece in loop for segment in piece.segments(canvas))
-    return Contour(_point(loop[0].begin, canvas), segments)
-
-
-def _point(place: Points, canvas: Canvas) -> tuple[float, float]:
-    x, y = canvas.rounded(place).tolist()
-    return x, y

@@ -10,7 +10,8 @@ import numpy as np
 
 from ...outlines import EllipseOutline, PolygonOutline, RectangleOutline
 from .canvas import Points
-from .display import Drawing, Figure, Geometry, Group, Path
+from .display import Drawing, Figure, Geometry, Group, Path, Stroke
+from .pieces import points_along
 
 REACH = 3.0  # standard deviations that a blur reaches
 USUAL_MARGIN = 0.1  # of a box, that a filter's region has by itself
@@ -124,7 +125,7 @@ def _alike(figures: Sequence[Figure]) -> list[_Shared]:
         margins = _stepped(np.array(wanted))
     found: dict[tuple[float, ...], _Shared] = {}
     for figure, box, own in zip(figures, boxes, margins, strict=True):
-        number = 1.0 if isinstance(figure.geometry, PolygonOutline | Path) else math.inf
+        number = 1.0 if isinstance(figure.geometry, PolygonOutline | Path | Stroke) else math.inf
         area = float(box.prod()) if number == math.inf or box.min() >= THIN else math.inf
         one, key = _Shared((figure,), own, area, number), (number, *own.tolist())
         found[key] = found[key] | one if key in found else one
@@ -166,17 +167,21 @@ def _merged(groups: list[_Shared], canvas: Region, price: float) -> list[_Shared
 
 
 def rounding_of(figure: Figure) -> float:
-    """The rounding of a polygon, in user units; of all else none."""
+    """By how much a polygon or a line is larger than its own box, on each side, in user units; all else is not."""
+    if isinstance(figure.geometry, Stroke):
+        return figure.geometry.width / 2.0
     return figure.geometry.rounding if isinstance(figure.geometry, PolygonOutline) else 0.0
 
 
 def box_of(geometry: Geometry) -> Points:
-    """Width and height [2] of a geometry in its own frame, without a polygon's rounding."""
+    """Width and height [2] of a geometry in its own frame, without the rounding."""
     if isinstance(geometry, EllipseOutline):
         return 2.0 * np.array(geometry.radii)
     if isinstance(geometry, RectangleOutline):
         return 2.0 * np.array(geometry.half_size)
     if isinstance(geometry, PolygonOutline):
         return np.asarray(np.ptp(np.array(geometry.points), axis=0))
+    if isinstance(geometry, Stroke):
+        return np.asarray(np.ptp(points_along(geometry.line), axis=0))
     points = [point for contour in geometry.contours for point in contour.points]
     return np.asarray(np.ptp(np.array(points), axis=0))

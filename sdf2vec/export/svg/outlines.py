@@ -9,12 +9,13 @@ from functools import singledispatch
 import numpy as np
 
 from ...arrays import Float64Array
-from ...outlines import EllipseOutline, Outline, PolygonOutline, RectangleOutline
+from ...outlines import ArcOutline, EllipseOutline, Outline, PolygonOutline, RectangleOutline
 from ...scene import Layer
 from ...shapes import KINDS
 from .bezier_fit import smooth_path
 from .canvas import Canvas, Points, pairs
-from .display import Geometry
+from .display import Geometry, Stroke
+from .pieces import arc_between, contour
 from .sampling import SampleGrid
 
 FLAT = 1e-9  # scene units: a side shorter than this is none
@@ -64,6 +65,13 @@ def _(outline: RectangleOutline, canvas: Canvas) -> Geometry:
 @placed.register
 def _(outline: PolygonOutline, canvas: Canvas) -> Geometry:
     return PolygonOutline(pairs(canvas.places(outline.points)), outline.rounding * canvas.unit)
+
+
+@placed.register
+def _(outline: ArcOutline, canvas: Canvas) -> Geometry:
+    start, end = canvas.places((outline.start, outline.end))
+    piece = arc_between(start, end, outline.sagitta * canvas.unit)
+    return Stroke(contour([piece], canvas), 2.0 * outline.half_width * canvas.unit)
 
 
 @placed.register

@@ -7,7 +7,7 @@ import math
 import re
 from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import singledispatchmethod
 from itertools import groupby
 from typing import Any
@@ -33,6 +33,7 @@ from .display import (
     Path,
     RadialGradient,
     Stop,
+    Stroke,
     points_of,
 )
 from .filter_regions import Region, region_of, region_of_group, rounding_of, shared_regions
@@ -45,11 +46,10 @@ Attributes = dict[str, str | None]
 PREFIX = "@@"  # of ids, until the content that makes it is known
 NEEDLESS = ("version", "baseProfile", "xmlns:ev", "xmlns:xlink")  # that svgwrite puts at the root
 SHARED = ("fill", "fill-rule", "shape-rendering")  # attributes that a group says for all its items
-LINE = 2  # points of a polygon that is a line
 FLAT = 0.05  # user units: a rounding below it is none
 STROKES = {"stroke-width": "0", "stroke-linejoin": "round"}
 # said by a class, never by a group: CairoSVG and Inkscape take the group's own colour for it then
-OWN_COLOR = ";fill:currentColor;stroke:currentColor"
+OWN_COLOR, OWN_STROKE = ";fill:currentColor;stroke:currentColor", ";fill:none;stroke:currentColor"
 
 
 @dataclass(frozen=True)
@@ -96,7 +96,7 @@ class _Writer:
         self.roundings = _usual_roundings(drawing.figures)
         self.strokes = style.compact and any(rounding_of(figure) > 0.0 for figure in drawing.figures)
         self.regions = shared_regions(drawing, style.filter) if style.compact else {}
-        self.polygons = self._polygons() if style.compact else {}
+        self.data = self._data() if style.compact else {}
 
     def text(self) -> str:
         """The document without its title, ids with PREFIX."""
@@ -106,7 +106,7 @@ class _Writer:
         items = list(self._elements())
         if self.strokes:
             body = self.svg.add(self.svg.g(**STROKES))
-            if any(is_line(figure.geometry) for figure in drawing.figures):
+            if any(isinstance(figure.geometry, Stroke) for figure in drawing.figures):
                 body["stroke-linecap"] = "round"
         for item in items:
             body.add(item)
@@ -118,16 +118,17 @@ class _Writer:
         return _lean(self.svg.get_xml())
 
     def _elements(self) -> Iterator[Element]:
-        """One for each item, or for a run of lines that are drawn with the same pen."""
+        """One for each item, or for a run of strokes of the same pen."""
         for pen, run in groupby(self.drawing.items, pen_of):
             first, *rest = run
             if pen is None or not rest or not self.strokes:
                 yield from map(self.item, (first, *rest))
                 continue
             figures = [item for item in (first, *rest) if isinstance(item, Figure)]
-            lines = [each.geometry for each in figures if isinstance(each.geometry, PolygonOutline)]
-            data = "".join(self._line(line, alone=False) for line in lines)
-            yield self._with(self.svg.path(data), self._look(figures[0]))
+            lines = [each.geometry.line for each in figures if isinstance(each.geometry, Stroke)]
+            data = "".join(self._open(line, alone=False) for line in lines)
+            bent = next((figure for figure in figures if _is_bent(figure.geometry)), figures[0])
+            yield self._with(self.svg.path(data), self._look(bent))
 
     def item(self, item: Item) -> Element:
         """A figure or a group; what a group's figures have in common is said by it."""
@@ -157,26 +158,32 @@ class _Writer:
         rounding = rounding_of(figure)
         look: Attributes = {"opacity": opacity_text(figure.opacity)}
         paint = self.paint(figure.fill, figure)
+        is_bent = _is_bent(figure.geometry)
         is_said_once = self.strokes and figure.blur > 0.0 and isinstance(figure.fill, tuple)
         if is_said_once:
             look["color"] = paint
         else:
-            look |= {"fill": None if pen_of(figure) else paint, "stroke": paint if rounding else None}
+            fill = "none" if is_bent else None if pen_of(figure) else paint
+            look |= {"fill": fill, "stroke": paint if rounding else None}
         stroke = self.number(2.0 * rounding) if rounding else None
         if figure.blur:
             usual = stroke and rounding == self.roundings.get(figure.blur)
             rule = f";stroke-width:{self.fine(2.0 * rounding)}" if usual else ""
-            own = OWN_COLOR if is_said_once else ""
+            own = (OWN_STROKE if is_bent else OWN_COLOR) if is_said_once else ""
             look["class"] = self._class(f"filter:{self._filter(figure)}{own}{rule}")
             stroke = None if usual else stroke
         return look | {"stroke-width": stroke}
 
     def _painted(self, figure: Figure) -> Attributes:
         look: Attributes = {"fill": self.paint(figure.fill, figure)}
+        if isinstance(figure.geometry, Stroke):
+            width = self.number(figure.geometry.width)
+            look = {"fill": "none", "stroke": look["fill"], "stroke-width": width, "stroke-linecap": "round"}
         if figure.blur:
             look["filter"] = self._filter(figure)
         else:
-            key = "fill-opacity" if isinstance(figure.fill, tuple) else "opacity"
+            is_plain = isinstance(figure.fill, tuple) and not isinstance(figure.geometry, Stroke)
+            key = "fill-opacity" if is_plain else "opacity"
             look[key] = opacity_text(figure.opacity)
         if not figure.antialiased:
             look["shape-rendering"] = "crispEdges"
@@ -289,7 +296,12 @@ class _Writer:
 
     @element.register
     def _(self, geometry: PolygonOutline, look: Attributes) -> Element:
-        data = self.polygons[geometry] if self.style.compact else self._closed(geometry)
+        data = self.data[geometry] if self.style.compact else self._closed(geometry)
+        return self._with(self.svg.path(data), look)
+
+    @element.register
+    def _(self, geometry: Stroke, look: Attributes) -> Element:
+        data = self.data[geometry] if self.style.compact else self._open(geometry.line)
         return self._with(self.svg.path(data), look)
 
     @element.register
@@ -302,28 +314,28 @@ class _Writer:
         element.attribs.update({key: value for key, value in look.items() if value is not None})
         return element
 
-    def _polygons(self) -> dict[PolygonOutline, str]:
-        """Path data of each polygon, from the corner and the way round that compress best."""
+    def _data(self) -> dict[PolygonOutline | Stroke, str]:
+        """Path data of each polygon and line, from the corner or the end and the way round that compress best."""
         figures = self.drawing.figures
         found = dict.fromkeys(
-            figure.geometry for figure in figures if isinstance(figure.geometry, PolygonOutline)
+            figure.geometry for figure in figures if isinstance(figure.geometry, PolygonOutline | Stroke)
         )
         colors = "".join(color_text(figure.fill)[1:] for figure in figures if isinstance(figure.fill, tuple))
         return dict(zip(found, compressible([self._ways_round(each) for each in found], colors), strict=True))
 
-    def _ways_round(self, polygon: PolygonOutline) -> list[str]:
-        corners = np.array(polygon.points)
-        if len(corners) == LINE:
-            return [self._line(polygon), self._line(replace(polygon, points=polygon.points[::-1]))]
+    def _ways_round(self, geometry: PolygonOutline | Stroke) -> list[str]:
+        if isinstance(geometry, Stroke):
+            return [self._open(line) for line in (geometry.line, geometry.line.reversed)]
+        corners = np.array(geometry.points)
         return [
             self._relative(Contour.straight(pairs(np.roll(way, -first, axis=0))))
             for way in (corners, corners[::-1])
             for first in range(len(corners))
         ]
 
-    def _line(self, line: PolygonOutline, alone: bool = True) -> str:
-        """Path data of a polygon of two points, which is not closed: its ends are round."""
-        return self._relative(Contour.straight(line.points), alone).removesuffix("z")
+    def _open(self, line: Contour, alone: bool = True) -> str:
+        """Path data of a line that is not closed."""
+        return self._relative(line, alone).removesuffix("z")
 
     def _closed(self, outline: PolygonOutline) -> str:
         """Path data of a polygon: straight edges moved outwards, joined by arcs."""
@@ -378,17 +390,17 @@ class _Writer:
         return number(value, self.drawing.digits + 2)
 
 
-def is_line(geometry: Geometry) -> bool:
-    """Whether it is a line from point to point, of which only the rounding is to be seen."""
-    return isinstance(geometry, PolygonOutline) and len(geometry.points) == LINE
+def _is_bent(geometry: Geometry) -> bool:
+    """Whether it is a line that would have an area if it were filled."""
+    return isinstance(geometry, Stroke) and not geometry.line.is_straight
 
 
 def pen_of(item: Item) -> tuple[Color, float] | None:
-    """The colour and the rounding of what is a line, neither blurred nor translucent; None for all else."""
-    if not isinstance(item, Figure) or not isinstance(item.geometry, PolygonOutline):
+    """The colour and the width of a stroke that is neither blurred nor translucent; None for all else."""
+    if not isinstance(item, Figure) or not isinstance(item.geometry, Stroke):
         return None
-    is_plain = is_line(item.geometry) and item.opacity == 1.0 and not item.blur
-    return (item.fill, item.geometry.rounding) if is_plain and isinstance(item.fill, tuple) else None
+    is_plain = item.opacity == 1.0 and not item.blur
+    return (item.fill, item.geometry.width) if is_plain and isinstance(item.fill, tuple) else None
 
 
 def _attributes(region: Region) -> dict[str, str]:
