@@ -20,14 +20,14 @@ from .export.exported import Exported
 from .export.options import PICTURE, Options
 from .export.rounding import COARSEST, FINEST, Rounded, Rounding
 from .grain import DENSE, GRAINS, USUAL, Drawable, Grain, is_few_and_sharp
-from .scene import Layer, Scene
+from .scene import Scene
 from .steps import StepsOf
 
 if TYPE_CHECKING:
     from .fit.settling import Views
     from .image import Picture
 
-SEVERAL, ROUND = 2, 0.99  # lines; share of half a width that their ends are round by
+STROKE, SEVERAL = "arc", 2  # kind; how many
 HARDLY, LITTLE = 0.2, 0.5  # dB that a small drawing may lose of the picture: a coarse one, a finer one
 LIKE_RENDER_ERROR = 10**-4.2  # mean squared, of what is 42 dB from the render
 SAME = 99.0  # dB of what is the same
@@ -333,16 +333,8 @@ class Exports:
 def _is_plain(scene: Scene) -> bool:
     """Whether an SVG of plain elements, with names, is small enough: not where lines of one pen take fewer words."""
     is_single = all(len(layer.shapes) == 1 for layer in scene.layers)
-    return is_few_and_sharp(scene) and is_single and sum(map(_is_line, scene.layers)) < SEVERAL
-
-
-def _is_line(layer: Layer) -> bool:
-    """Whether a layer is a box that ends in half discs."""
-    (shape,) = layer.shapes
-    if shape.kind != "box":
-        return False
-    _, _, *sides, _, corner = shape.parameters
-    return corner >= ROUND * min(sides)
+    strokes = sum(shape.kind == STROKE for layer in scene.layers for shape in layer.shapes)
+    return is_few_and_sharp(scene) and is_single and strokes < SEVERAL
 
 
 def _mixes_colors(scene: Scene) -> bool:

@@ -20,7 +20,7 @@ from ..scene import Scene
 from ..shapes import KINDS
 from ..steps import Steps
 from ..units import COLOR, FALLOFF, OPACITY, POSITION
-from .pens import in_one_width, strokes_of, with_round_ends
+from .pens import in_one_width
 from .presets import MSE, Phase
 from .runs import Softening
 from .settling import GOING_ON, PHASES, Kept, Settling, Views, descend
@@ -40,7 +40,8 @@ BLURRED = (  # of layers that are blurred in runs, no longer each by its falloff
 FINE = (256, 320, 384)  # pixels squared, of these phases, where a run needs them
 FINER = 1.3  # pixels: one of a smaller standard deviation does
 GROWTH = 1.1  # of a triangle's spread, where its edge moves outwards
-GROWING = ("radius", "radii", "half_size", "corner_radius")  # what a shape is larger by; others have corners
+# what a shape is larger by; others have corners
+GROWING = ("radius", "radii", "half_size", "corner_radius", "half_width")
 TINY = 1e-12
 
 
@@ -120,9 +121,7 @@ def _softest(group: Group) -> float:
 
 
 def _ended(tensors: SceneTensors, scene: Scene, softening: Softening | None) -> Drawable:
-    for group, before in zip(tensors.groups, from_scene(scene).groups, strict=True):
-        with_round_ends(group, strokes_of(before))
-        in_one_width(group, before)
+    in_one_width(tensors.groups, from_scene(scene).groups)
     runs = softening.ended if softening else ()
     return Drawable(to_scene(tensors, scene.width, scene.height), runs)
 

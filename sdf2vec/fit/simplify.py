@@ -26,6 +26,7 @@ from .surroundings import Surroundings, View, error_of, layer_at
 
 STEPS = 10  # of a changed layer
 RISE = 1.02  # of the error, at most, by one change
+BENT = 1.0  # pixels between an arc and a line that may be straight
 UPRIGHT = 0.05  # radians off, at most, of what is tried upright
 NEARLY_OPAQUE = 0.3  # on one colour, opacity and colour may stand for each other
 UNSEEN = (0.25 / 255) ** 2  # by which the mean squared error may always rise: a quarter of a level
@@ -220,6 +221,14 @@ def _unrounded(layer: Group, view: View) -> Iterator[Change]:
             yield _with(layer, slot, 0.0), (slot,)
 
 
+def _straight(layer: Group, view: View) -> Iterator[Change]:
+    """An arc that is hardly bent as a line."""
+    pixel = 1.0 / min(view.target.shape[1:])
+    for slot, tensor in layer.values.items():
+        if slot.part is not None and slot.parameter.name == "sagitta" and abs(float(tensor)) <= BENT * pixel:
+            yield _with(layer, slot, 0.0), (slot,)
+
+
 def _with(layer: Group, changed: Slot, value: float) -> Group:
     """The layer with one number."""
     values = {
@@ -235,6 +244,7 @@ CHANGES: tuple[Propose, ...] = (
     _flat,
     _joined_sharply,
     _unrounded,
+    _straight,
     _upright,
     _opaque,
     _sharp,

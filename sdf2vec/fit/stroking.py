@@ -1,5 +1,5 @@
-"""The layers that draw a region's strokes: boxes with round corners, what is left of boxes out of which others are cut,
-and what wedges leave of rings.
+"""The layers that draw a region's strokes: arcs; where their ends are square, boxes and what wedges leave of rings; and
+boxes out of which others are cut.
 """
 
 from __future__ import annotations
@@ -19,11 +19,10 @@ from .areas import CIRCLE, Area
 from .candidates import Opening, Proposer, joined_sharply
 from .covering import BOX, TRIANGLE, with_triangle
 from .frames import Frame, framed
+from .pens import ARC
 from .strokes import Bow, Line, Stroke, strokes
 
-KINDS_OF_STROKES = frozenset((BOX, CIRCLE, TRIANGLE))
-SEEN = 16  # points of the edge of a disc at an end of a bow
-WITHIN = 0.9  # of its radius: where they are
+KINDS_OF_STROKES = frozenset((BOX, CIRCLE, TRIANGLE, ARC))
 
 
 def stroked(area: Area, proposer: Proposer) -> list[Group]:
@@ -35,23 +34,25 @@ def stroked(area: Area, proposer: Proposer) -> list[Group]:
 
 def layers_of(found: Sequence[Stroke | Frame], area: Area) -> list[Group]:
     """Those that draw some strokes, in the pixels of an area, in its colour."""
-    return [_layer(stroke, found, area) for stroke in found]
+    return [_layer(stroke, area) for stroke in found]
 
 
-def _layer(stroke: Stroke | Frame, every: Sequence[Stroke | Frame], area: Area) -> Group:
+def _layer(stroke: Stroke | Frame, area: Area) -> Group:
+    if isinstance(stroke, Frame):
+        return _frame(stroke, area)
     if isinstance(stroke, Line):
-        return _line(stroke, area)
-    return (
-        _frame(stroke, area) if isinstance(stroke, Frame) else _bow(stroke, _bare_ends(stroke, every), area)
-    )
+        return _bar(stroke, area) if stroke.square else _arc(stroke, (stroke.start + stroke.end) / 2.0, area)
+    if stroke.square or stroke.is_closed:
+        return _ring(stroke, area)
+    (middle,) = stroke.at(np.array([stroke.first + stroke.span / 2.0]))
+    return _arc(stroke, middle, area)
 
 
-def _line(line: Line, area: Area) -> Group:
+def _bar(line: Line, area: Area) -> Group:
     """A layer of a box."""
     along, sides = line.end - line.start, (line.length / 2.0 + line.half, line.half)
-    radius = 0.0 if line.square else line.half
     middle = (line.start + line.end) / 2.0
-    return _with_box(middle, sides, math.atan2(along[1], along[0]), radius, area, area.opening())
+    return _with_box(middle, sides, math.atan2(along[1], along[0]), 0.0, area, area.opening())
 
 
 def _frame(frame: Frame, area: Area) -> Group:
@@ -80,8 +81,20 @@ def _with_box(
     return place.filled(place.part(BOX, FLAT), box)
 
 
-def _bow(bow: Bow, ends: Sequence[Float64Array], area: Area) -> Group:
-    """A layer of a ring, of which wedges leave or take away a part, and of discs at some ends."""
+def _arc(stroke: Stroke, middle: Float64Array, area: Area) -> Group:
+    """A layer of an arc from end to end through a middle [2]."""
+    pixel, place = area.around.points[2], area.opening()
+    start, end = stroke.ends
+    x, y = (end - start) / max(float(np.linalg.norm(end - start)), 1e-9)
+    sagitta = float((middle - (start + end) / 2.0) @ np.array([-y, x]))
+    a, b = area.around.places(torch.from_numpy(stroke.ends)).float()[:, None]
+    lengths = {"sagitta": sagitta, "half_width": stroke.half}
+    arc = {"a": a, "b": b} | {name: torch.tensor([[v * pixel]]) for name, v in lengths.items()}
+    return place.filled(place.part(ARC, FLAT), arc)
+
+
+def _ring(bow: Bow, area: Area) -> Group:
+    """A layer of a ring, of which wedges leave or take away a part."""
     x, y = bow.middle.tolist()
     layer = area.with_circle(x, y, bow.radius + bow.half, area.opening())
     if bow.radius > bow.half:
@@ -89,8 +102,6 @@ def _bow(bow: Bow, ends: Sequence[Float64Array], area: Area) -> Group:
     for join, triangle in () if bow.is_closed else _wedges(bow):
         place = area.cut(layer) if join == SUBTRACTION else area.meeting(layer)
         layer = with_triangle(place, triangle, area.around)
-    for end in ends:
-        layer = area.with_circle(float(end[0]), float(end[1]), bow.half, area.joining(layer))
     return joined_sharply(layer)
 
 
@@ -104,15 +115,3 @@ def _wedges(bow: Bow) -> Iterator[tuple[str, Float64Array]]:
     count = math.ceil(gap / WIDEST)
     for index in range(count):
         yield SUBTRACTION, wedge(bow.middle, radius, first + span + index * gap / count, gap / count)
-
-
-def _bare_ends(bow: Bow, every: Sequence[Stroke | Frame]) -> list[Float64Array]:
-    """The round ends of a bow that no other stroke covers."""
-    if bow.square:
-        return []
-    turns = np.linspace(0.0, math.tau, SEEN, endpoint=False)
-    edge = WITHIN * bow.half * np.stack([np.cos(turns), np.sin(turns)], axis=1)
-    own = [bow.without_ends, *(stroke for stroke in every if stroke is not bow)]
-    return [
-        end for end in bow.ends if not np.any([stroke.covers(end + edge) for stroke in own], axis=0).all()
-    ]

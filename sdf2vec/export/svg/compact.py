@@ -15,12 +15,12 @@ import numpy as np
 
 from ...blend import EDGE_DEVIATION
 from ...grain import Drawable, Grain, Run
-from ...outlines import EllipseOutline, Outline, PolygonOutline
+from ...outlines import ArcOutline, EllipseOutline, Outline, PolygonOutline
 from ...render.occlusion import showing
 from ...scene import Layer, Scene
 from .blur import best_traced, trial_of
 from .canvas import Canvas, Points, pairs
-from .display import Contour, Drawing, Figure, Geometry, Group, Item, Path, Stroke
+from .display import Drawing, Figure, Geometry, Group, Item, Path
 from .outlines import Traced, core, distance_to, edge_of, placed
 from .refit_appearance import HASTY, Difference, refitted
 from .sampling import distances
@@ -115,8 +115,8 @@ def _squared_move(geometry: Geometry, canvas: Canvas) -> float:
         return (STRAYED * _tolerance(canvas)) ** 2 + ROUNDED
     if isinstance(geometry, PolygonOutline):
         numbers = np.array(geometry.points)
-    elif isinstance(geometry, Stroke):
-        numbers = np.array([geometry.line.start, *geometry.line.points])
+    elif isinstance(geometry, ArcOutline):
+        numbers = np.array([*geometry.start, *geometry.end])
     elif isinstance(geometry, EllipseOutline):
         numbers = np.array([*geometry.center, *geometry.radii])
     else:
@@ -163,12 +163,13 @@ def _tolerance(canvas: Canvas) -> float:
 
 
 def _whole(outline: Outline, canvas: Canvas) -> Geometry:
-    """An outline in user units: a polygon and a rounding, a stroke, an ellipse with radii of one unit or more."""
+    """An outline in user units: a polygon and a rounding, an arc, an ellipse with radii of one unit or more."""
     if (made := core(outline)) is not None:
         points, rounding = made
         corners = pairs(_thinned(canvas.places(points)))
         if len(corners) == LINE:
-            return Stroke(Contour.straight(corners), 2.0 * rounding * canvas.unit)
+            start, end = corners
+            return ArcOutline(start, end, 0.0, rounding * canvas.unit)
         return PolygonOutline(corners, rounding * canvas.unit)
     geometry = placed(outline, canvas)
     if isinstance(geometry, EllipseOutline):
@@ -187,9 +188,9 @@ def _thinned(points: Points) -> Points:
 
 def _rounded(geometry: Geometry, canvas: Canvas) -> Geometry:
     """Corners and ends as they will be written; the writer rounds other numbers."""
-    if isinstance(geometry, Stroke) and geometry.line.is_straight:
-        ends = canvas.rounded(np.array([geometry.line.start, *geometry.line.points]))
-        return replace(geometry, line=Contour.straight(pairs(ends)))
+    if isinstance(geometry, ArcOutline):
+        start, end = pairs(canvas.rounded(np.array([geometry.start, geometry.end])))
+        return replace(geometry, start=start, end=end)
     if not isinstance(geometry, PolygonOutline):
         return geometry
     return replace(geometry, points=pairs(canvas.rounded(np.array(geometry.points))))

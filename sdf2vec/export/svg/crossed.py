@@ -17,13 +17,13 @@ from ...arrays import BoolArray, Float64Array
 from ...blend import JOINS, SHARPEST
 from ...expr import const, var, vec3, vec4
 from ...lower.numpy import compile_numpy
-from ...outlines import EllipseOutline, Outline
+from ...outlines import ArcOutline, EllipseOutline, Outline
 from ...scene import Layer
 from .canvas import Canvas, Points
 from .display import Path
 from .isobands import seen
 from .outlines import convex, core, distance_at, edge_of, placed, sides
-from .pieces import Piece, arc, contour
+from .pieces import Piece, arc, contour, middle_line, radius_of
 from .sampling import distance_of
 
 MOST = 16  # shapes
@@ -49,7 +49,7 @@ def crossed(layer: Layer, canvas: Canvas, off: float) -> Path | None:
     loops = _loops(kept)
     if not loops or not _is_outline(loops, layer, canvas, off):
         return None
-    return Path(tuple(contour(loop, canvas) for loop in loops))
+    return Path(tuple(contour(loop, canvas.digits) for loop in loops))
 
 
 def _outlines_of(layer: Layer) -> list[Outline] | None:
@@ -71,13 +71,17 @@ def _has_area(outline: Outline) -> bool:
     if isinstance(outline, EllipseOutline):
         return min(outline.radii) > 0
     made = core(outline)
-    return made is not None and made[1] >= 0 and len(convex(made[0])) > 2
+    if made is None:
+        return isinstance(outline, ArcOutline) and 0 < outline.half_width < radius_of(outline)
+    return made[1] >= 0 and len(convex(made[0])) + (made[1] > 0) > 2
 
 
 def _pieces(outline: Outline) -> list[Piece]:
     """An outline, clockwise on the screen."""
     made = core(outline)
     if made is None:
+        if isinstance(outline, ArcOutline):
+            return _around(outline)
         assert isinstance(outline, EllipseOutline)
         (across, down), angle = outline.radii, outline.angle
         if across < down:  # where it begins, its ends are farthest apart
@@ -85,8 +89,6 @@ def _pieces(outline: Outline) -> list[Piece]:
         return [arc(outline.center, (across, down), angle, 0.0, math.tau)]
     points, rounding = made
     corners = convex(points)
-    if len(corners) < 3:
-        return []
     found = []
     around = sides(corners)
     for (a, b, normal), (*_, following) in zip(around, [*around[1:], around[0]], strict=True):
@@ -97,13 +99,40 @@ def _pieces(outline: Outline) -> list[Piece]:
     return found
 
 
+def _around(outline: ArcOutline) -> list[Piece]:
+    """The outline of what a pen draws along an arc, clockwise on the screen."""
+    half, radius, line = outline.half_width, radius_of(outline), middle_line(outline)
+    along = line if line.span > 0 else line.part(1.0, 0.0)
+    first, last = along.first, along.first + along.span
+    outer, inner = radius + half, radius - half
+    return [
+        arc(along.start, (outer, outer), 0.0, first, along.span),
+        arc(along.end, (half, half), 0.0, last, math.pi),
+        arc(along.start, (inner, inner), 0.0, last, -along.span),
+        arc(along.begin, (half, half), 0.0, first + math.pi, math.pi),
+    ]
+
+
 def _depths(outline: Outline, points: Points) -> Float64Array:
     """Less than 0 within an outline, [N] for points [N, 2]."""
-    if not isinstance(outline, EllipseOutline):
+    if core(outline) is not None:
         return distance_at(outline, *points.T)
+    if isinstance(outline, ArcOutline):
+        return _arc_depths(outline, points)
+    assert isinstance(outline, EllipseOutline)
     cosine, sine = math.cos(outline.angle), math.sin(outline.angle)
     turned = (points - outline.center) @ np.array([[cosine, -sine], [sine, cosine]]) / outline.radii
     return np.asarray(np.linalg.norm(turned, axis=1) - 1.0)
+
+
+def _arc_depths(outline: ArcOutline, points: Points) -> Float64Array:
+    line, radius = middle_line(outline), radius_of(outline)
+    away = points - line.start
+    turns = np.arctan2(away[:, 1], away[:, 0]) - line.first
+    is_beside = np.mod(math.copysign(1.0, line.span) * turns, math.tau) <= abs(line.span)
+    to_ends = [np.linalg.norm(points - end, axis=1) for end in (line.begin, line.end)]
+    off = np.where(is_beside, np.abs(np.linalg.norm(away, axis=1) - radius), np.minimum(*to_ends))
+    return np.asarray(off - outline.half_width)
 
 
 def _joined(joins: Sequence[str], inside: Sequence[BoolArray]) -> BoolArray:

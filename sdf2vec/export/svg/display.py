@@ -10,7 +10,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import NamedTuple
 
-from ...outlines import EllipseOutline, Point, PolygonOutline, RectangleOutline
+from ...outlines import Outline, Point
 from ...scene import Color, Ground
 
 
@@ -58,28 +58,9 @@ class Contour(NamedTuple):
         return any(len(segment) > 1 for segment in self.segments if not isinstance(segment, Arc))
 
     @property
-    def is_straight(self) -> bool:
-        """Whether it is one line."""
-        return len(self.segments) == 1 and self.begins_straight
-
-    @property
     def points(self) -> list[Point]:
         """Those that its segments tell, but the start."""
         return [point for segment in self.segments for point in points_of(segment)]
-
-    @property
-    def reversed(self) -> Contour:
-        """The same from its end to its start."""
-        around: list[Segment] = []
-        start = self.start
-        for segment in self.segments:
-            *inner, end = points_of(segment)
-            back: Segment = (*reversed(inner), start)
-            if isinstance(segment, Arc):
-                back = segment._replace(is_clockwise=not segment.is_clockwise, end=start)
-            around.append(back)
-            start = end
-        return Contour(start, tuple(reversed(around)))
 
 
 @dataclass(frozen=True)
@@ -89,15 +70,7 @@ class Path:
     contours: tuple[Contour, ...]
 
 
-@dataclass(frozen=True)
-class Stroke:
-    """What a round pen draws along a line."""
-
-    line: Contour
-    width: float
-
-
-Geometry = EllipseOutline | RectangleOutline | PolygonOutline | Path | Stroke
+Geometry = Outline | Path
 
 
 class Stop(NamedTuple):

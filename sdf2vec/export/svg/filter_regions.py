@@ -8,15 +8,16 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ...outlines import EllipseOutline, PolygonOutline, RectangleOutline
+from ...outlines import ArcOutline, EllipseOutline, PolygonOutline, RectangleOutline
 from .canvas import Points
-from .display import Drawing, Figure, Geometry, Group, Path, Stroke
-from .pieces import points_along
+from .display import Drawing, Figure, Geometry, Group, Path
+from .pieces import middle_line
 
 REACH = 3.0  # standard deviations that a blur reaches
 USUAL_MARGIN = 0.1  # of a box, that a filter's region has by itself
 LARGER = 3.0  # times as large a region is as good
 SMALLEST = 0.1  # user units: no box is taken for smaller
+ALONG = 33  # points of an arc
 THIN = 1.0  # user units: a side that may be written as none, and nothing is blurred in shares of that
 MOST = 128  # different margins of figures of one blur; of more, those are told apart that are of other steps
 MARGINS = (0.1, 0.2, 0.3, 0.45, 0.6, 0.8, 1.1, 1.5, 2, 3, 4.5, 7, 10, 20, 50, 100, 200, 500, 1000)
@@ -125,7 +126,7 @@ def _alike(figures: Sequence[Figure]) -> list[_Shared]:
         margins = _stepped(np.array(wanted))
     found: dict[tuple[float, ...], _Shared] = {}
     for figure, box, own in zip(figures, boxes, margins, strict=True):
-        number = 1.0 if isinstance(figure.geometry, PolygonOutline | Path | Stroke) else math.inf
+        number = 1.0 if isinstance(figure.geometry, PolygonOutline | ArcOutline | Path) else math.inf
         area = float(box.prod()) if number == math.inf or box.min() >= THIN else math.inf
         one, key = _Shared((figure,), own, area, number), (number, *own.tolist())
         found[key] = found[key] | one if key in found else one
@@ -168,8 +169,8 @@ def _merged(groups: list[_Shared], canvas: Region, price: float) -> list[_Shared
 
 def rounding_of(figure: Figure) -> float:
     """By how much a polygon or a line is larger than its own box, on each side, in user units; all else is not."""
-    if isinstance(figure.geometry, Stroke):
-        return figure.geometry.width / 2.0
+    if isinstance(figure.geometry, ArcOutline):
+        return figure.geometry.half_width
     return figure.geometry.rounding if isinstance(figure.geometry, PolygonOutline) else 0.0
 
 
@@ -181,7 +182,7 @@ def box_of(geometry: Geometry) -> Points:
         return 2.0 * np.array(geometry.half_size)
     if isinstance(geometry, PolygonOutline):
         return np.asarray(np.ptp(np.array(geometry.points), axis=0))
-    if isinstance(geometry, Stroke):
-        return np.asarray(np.ptp(points_along(geometry.line), axis=0))
+    if isinstance(geometry, ArcOutline):
+        return np.asarray(np.ptp(middle_line(geometry).at(np.linspace(0.0, 1.0, ALONG)), axis=0))
     points = [point for contour in geometry.contours for point in contour.points]
     return np.asarray(np.ptp(np.array(points), axis=0))

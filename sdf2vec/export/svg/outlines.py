@@ -14,8 +14,7 @@ from ...scene import Layer
 from ...shapes import KINDS
 from .bezier_fit import smooth_path
 from .canvas import Canvas, Points, pairs
-from .display import Geometry, Stroke
-from .pieces import arc_between, contour
+from .display import Geometry
 from .sampling import SampleGrid
 
 FLAT = 1e-9  # scene units: a side shorter than this is none
@@ -69,9 +68,10 @@ def _(outline: PolygonOutline, canvas: Canvas) -> Geometry:
 
 @placed.register
 def _(outline: ArcOutline, canvas: Canvas) -> Geometry:
-    start, end = canvas.places((outline.start, outline.end))
-    piece = arc_between(start, end, outline.sagitta * canvas.unit)
-    return Stroke(contour([piece], canvas), 2.0 * outline.half_width * canvas.unit)
+    start, end = canvas.place(outline.start), canvas.place(outline.end)
+    sagitta = outline.sagitta * canvas.unit
+    is_line = abs(sagitta) < 0.5 * 10.0**-canvas.digits
+    return ArcOutline(start, end, 0.0 if is_line else sagitta, outline.half_width * canvas.unit)
 
 
 @placed.register
@@ -135,6 +135,11 @@ def _(outline: RectangleOutline) -> tuple[Points, float]:
     return turned + np.array(outline.center), outline.corner_radius
 
 
+@core.register
+def _(outline: ArcOutline) -> tuple[Points, float] | None:
+    return None if outline.sagitta else (np.array([outline.start, outline.end]), outline.half_width)
+
+
 # --- corners less round ------------------------------------------------------------------------------------
 
 
@@ -147,6 +152,11 @@ def sharpened(outline: Outline, share: float) -> Outline:
 @sharpened.register
 def _(outline: RectangleOutline, share: float) -> Outline:
     return replace(outline, corner_radius=outline.corner_radius * share)
+
+
+@sharpened.register
+def _(outline: ArcOutline, share: float) -> Outline:
+    return outline
 
 
 @sharpened.register

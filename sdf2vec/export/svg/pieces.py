@@ -9,15 +9,13 @@ from dataclasses import dataclass
 import numpy as np
 
 from ...arrays import Float64Array
-from ...outlines import Point
-from .canvas import Canvas, Points, growing
-from .display import Arc, Contour, Segment, points_of
+from ...outlines import ArcOutline, Point
+from .canvas import Points, growing
+from .display import Arc, Contour, Segment
 
 ROUND = math.tau - 1e-6  # a whole turn: two halves, as they are drawn whatever their rounded radius is
 # spans of an arc that are safe from the rounding of its radius; others are drawn as several
 WIDEST, AROUND = math.radians(150.0), (math.radians(210.0), math.radians(300.0))
-ALONG = 17  # points of a segment
-STRAIGHT = 0.02  # user units between an arc and its chord that are not seen
 
 
 @dataclass(frozen=True, eq=False)
@@ -70,17 +68,17 @@ class Piece:
             return None
         return Piece(self.start, self.step, self.radii, self.angle, self.first, self.span + other.span)
 
-    def segments(self, canvas: Canvas) -> Iterator[Segment]:
+    def segments(self, digits: int) -> Iterator[Segment]:
         """What is drawn of it."""
         if self.radii is None:
-            yield (_point(self.end, canvas),)
+            yield (_point(self.end, digits),)
             return
         span, radii = abs(self.span), self.radii
         count = 1 if span <= WIDEST or AROUND[0] <= span <= AROUND[1] else math.ceil(span / WIDEST)
         if span > ROUND:
-            count, radii = 2, np.array([growing(radius, canvas.digits) for radius in radii.tolist()])
+            count, radii = 2, np.array([growing(radius, digits) for radius in radii.tolist()])
         for end in np.arange(1, count + 1) / count:
-            to = _point(self.at(np.array([end]))[0], canvas)
+            to = _point(self.at(np.array([end]))[0], digits)
             yield Arc(
                 (float(radii[0]), float(radii[1])), self.angle, span / count > math.pi, self.span > 0, to
             )
@@ -92,45 +90,35 @@ def arc(center: Points | Point, radii: Point, angle: float, first: float, span: 
     return Piece(np.array(center, np.float64), nowhere, np.array(radii, np.float64), angle, first, span)
 
 
-def arc_between(start: Points, end: Points, sagitta: float) -> Piece:
-    """The arc of a circle from one point to another that is so far to the right of the chord; or a line."""
+def radius_of(outline: ArcOutline) -> float:
+    """Of the circle that an arc is a part of; none of a line."""
+    (x, y), (end_x, end_y) = outline.start, outline.end
+    squares = (end_x - x) ** 2 + (end_y - y) ** 2 + 4.0 * outline.sagitta**2
+    return squares / (8.0 * abs(outline.sagitta)) if outline.sagitta else math.inf
+
+
+def middle_line(outline: ArcOutline) -> Piece:
+    """What a pen draws along, of an outline in user units."""
+    start, end, sagitta = np.array(outline.start), np.array(outline.end), outline.sagitta
     chord = end - start
-    across = float(np.linalg.norm(chord))
-    if abs(sagitta) < STRAIGHT:
+    if not sagitta:
         return Piece(start, chord)
+    across = float(np.linalg.norm(chord))
     along = chord / across if across else np.array([1.0, 0.0])
     out = np.array([-along[1], along[0]])
-    radius = (across**2 / 4.0 + sagitta**2) / (2.0 * abs(sagitta))
+    radius = radius_of(outline)
     center = (start + end) / 2.0 + out * (sagitta - math.copysign(radius, sagitta))
     x, y = start - center
-    half = 2.0 * math.atan2(abs(sagitta), across / 2.0)
-    return arc(center, (radius, radius), 0.0, math.atan2(y, x), -math.copysign(2.0 * half, sagitta))
+    span = -4.0 * math.atan2(sagitta, across / 2.0)
+    return arc(center, (radius, radius), 0.0, math.atan2(y, x), span)
 
 
-def points_along(line: Contour) -> Points:
-    """Points [N, 2] along a line of straight segments and arcs of circles."""
-    found, start = [np.array([line.start])], np.array(line.start)
-    for segment in line.segments:
-        end = np.array(points_of(segment)[-1])
-        sagitta = _sagitta(segment, float(np.linalg.norm(end - start))) if isinstance(segment, Arc) else 0.0
-        found.append(arc_between(start, end, sagitta).at(np.linspace(0.0, 1.0, ALONG)))
-        start = end
-    return np.concatenate(found)
-
-
-def _sagitta(arc: Arc, across: float) -> float:
-    """How far an arc of a circle is to the right of its chord."""
-    radius = max(arc.radii[0], across / 2.0)
-    rest = math.sqrt(radius**2 - across**2 / 4.0)
-    return (radius + rest if arc.is_large else radius - rest) * (-1.0 if arc.is_clockwise else 1.0)
-
-
-def contour(pieces: Sequence[Piece], canvas: Canvas) -> Contour:
+def contour(pieces: Sequence[Piece], digits: int) -> Contour:
     """Pieces, each from where the one before ends, as they are drawn."""
-    segments = tuple(segment for piece in pieces for segment in piece.segments(canvas))
-    return Contour(_point(pieces[0].begin, canvas), segments)
+    segments = tuple(segment for piece in pieces for segment in piece.segments(digits))
+    return Contour(_point(pieces[0].begin, digits), segments)
 
 
-def _point(place: Points, canvas: Canvas) -> Point:
-    x, y = canvas.rounded(place).tolist()
+def _point(place: Points, digits: int) -> Point:
+    x, y = np.round(place, digits).tolist()
     return x, y

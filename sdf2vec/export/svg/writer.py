@@ -17,7 +17,7 @@ from xml.sax.saxutils import escape
 import numpy as np
 import svgwrite
 
-from ...outlines import EllipseOutline, Point, PolygonOutline, RectangleOutline
+from ...outlines import ArcOutline, EllipseOutline, Point, PolygonOutline, RectangleOutline
 from ...scene import Color
 from ..exported import MARK
 from .canvas import Points, growing, pairs
@@ -33,11 +33,11 @@ from .display import (
     Path,
     RadialGradient,
     Stop,
-    Stroke,
     points_of,
 )
 from .filter_regions import Region, region_of, region_of_group, rounding_of, shared_regions
 from .outlines import convex, sides
+from .pieces import contour, middle_line
 from .wording import compressible
 
 Element = Any  # svgwrite has no types
@@ -106,7 +106,7 @@ class _Writer:
         items = list(self._elements())
         if self.strokes:
             body = self.svg.add(self.svg.g(**STROKES))
-            if any(isinstance(figure.geometry, Stroke) for figure in drawing.figures):
+            if any(isinstance(figure.geometry, ArcOutline) for figure in drawing.figures):
                 body["stroke-linecap"] = "round"
         for item in items:
             body.add(item)
@@ -125,8 +125,8 @@ class _Writer:
                 yield from map(self.item, (first, *rest))
                 continue
             figures = [item for item in (first, *rest) if isinstance(item, Figure)]
-            lines = [each.geometry.line for each in figures if isinstance(each.geometry, Stroke)]
-            data = "".join(self._open(line, alone=False) for line in lines)
+            arcs = [each.geometry for each in figures if isinstance(each.geometry, ArcOutline)]
+            data = "".join(self._open(arc, alone=False) for arc in arcs)
             bent = next((figure for figure in figures if _is_bent(figure.geometry)), figures[0])
             yield self._with(self.svg.path(data), self._look(bent))
 
@@ -176,13 +176,13 @@ class _Writer:
 
     def _painted(self, figure: Figure) -> Attributes:
         look: Attributes = {"fill": self.paint(figure.fill, figure)}
-        if isinstance(figure.geometry, Stroke):
-            width = self.number(figure.geometry.width)
+        if isinstance(figure.geometry, ArcOutline):
+            width = self.number(2.0 * figure.geometry.half_width)
             look = {"fill": "none", "stroke": look["fill"], "stroke-width": width, "stroke-linecap": "round"}
         if figure.blur:
             look["filter"] = self._filter(figure)
         else:
-            is_plain = isinstance(figure.fill, tuple) and not isinstance(figure.geometry, Stroke)
+            is_plain = isinstance(figure.fill, tuple) and not isinstance(figure.geometry, ArcOutline)
             key = "fill-opacity" if is_plain else "opacity"
             look[key] = opacity_text(figure.opacity)
         if not figure.antialiased:
@@ -300,8 +300,8 @@ class _Writer:
         return self._with(self.svg.path(data), look)
 
     @element.register
-    def _(self, geometry: Stroke, look: Attributes) -> Element:
-        data = self.data[geometry] if self.style.compact else self._open(geometry.line)
+    def _(self, geometry: ArcOutline, look: Attributes) -> Element:
+        data = self.data[geometry] if self.style.compact else self._open(geometry)
         return self._with(self.svg.path(data), look)
 
     @element.register
@@ -314,18 +314,19 @@ class _Writer:
         element.attribs.update({key: value for key, value in look.items() if value is not None})
         return element
 
-    def _data(self) -> dict[PolygonOutline | Stroke, str]:
+    def _data(self) -> dict[PolygonOutline | ArcOutline, str]:
         """Path data of each polygon and line, from the corner or the end and the way round that compress best."""
         figures = self.drawing.figures
         found = dict.fromkeys(
-            figure.geometry for figure in figures if isinstance(figure.geometry, PolygonOutline | Stroke)
+            figure.geometry for figure in figures if isinstance(figure.geometry, PolygonOutline | ArcOutline)
         )
         colors = "".join(color_text(figure.fill)[1:] for figure in figures if isinstance(figure.fill, tuple))
         return dict(zip(found, compressible([self._ways_round(each) for each in found], colors), strict=True))
 
-    def _ways_round(self, geometry: PolygonOutline | Stroke) -> list[str]:
-        if isinstance(geometry, Stroke):
-            return [self._open(line) for line in (geometry.line, geometry.line.reversed)]
+    def _ways_round(self, geometry: PolygonOutline | ArcOutline) -> list[str]:
+        if isinstance(geometry, ArcOutline):
+            back = ArcOutline(geometry.end, geometry.start, -geometry.sagitta, geometry.half_width)
+            return [self._open(geometry), self._open(back)]
         corners = np.array(geometry.points)
         return [
             self._relative(Contour.straight(pairs(np.roll(way, -first, axis=0))))
@@ -333,9 +334,9 @@ class _Writer:
             for first in range(len(corners))
         ]
 
-    def _open(self, line: Contour, alone: bool = True) -> str:
-        """Path data of a line that is not closed."""
-        return self._relative(line, alone).removesuffix("z")
+    def _open(self, arc: ArcOutline, alone: bool = True) -> str:
+        """Path data of what a pen draws along."""
+        return self._relative(contour([middle_line(arc)], self.drawing.digits), alone).removesuffix("z")
 
     def _closed(self, outline: PolygonOutline) -> str:
         """Path data of a polygon: straight edges moved outwards, joined by arcs."""
@@ -392,15 +393,15 @@ class _Writer:
 
 def _is_bent(geometry: Geometry) -> bool:
     """Whether it is a line that would have an area if it were filled."""
-    return isinstance(geometry, Stroke) and not geometry.line.is_straight
+    return isinstance(geometry, ArcOutline) and geometry.sagitta != 0.0
 
 
 def pen_of(item: Item) -> tuple[Color, float] | None:
     """The colour and the width of a stroke that is neither blurred nor translucent; None for all else."""
-    if not isinstance(item, Figure) or not isinstance(item.geometry, Stroke):
+    if not isinstance(item, Figure) or not isinstance(item.geometry, ArcOutline):
         return None
     is_plain = item.opacity == 1.0 and not item.blur
-    return (item.fill, item.geometry.width) if is_plain and isinstance(item.fill, tuple) else None
+    return (item.fill, item.geometry.half_width) if is_plain and isinstance(item.fill, tuple) else None
 
 
 def _attributes(region: Region) -> dict[str, str]:
