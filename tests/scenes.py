@@ -29,6 +29,7 @@ def random_shape(kind: str, r: random.Random, lowest: float = 0.0, paint: str = 
         "ellipse": lambda: (x, y, size, size * r.uniform(0.2, 1.2), r.uniform(-7, 7)),
         "box": lambda: (x, y, size, size * r.uniform(0.2, 1.2), r.uniform(-7, 7), r.choice([0.0, 0.02, 0.5])),
         "triangle": lambda: tuple(c + r.uniform(-0.4, 0.4) for c in (x, y, x, y, x, y)),
+        "arc": lambda: (x, y, x + size * r.uniform(-1, 1), y + size, size * r.uniform(-1.5, 1.5), size * 0.2),
         "displaced": lambda: (x, y, size, size * 0.2, r.uniform(5, 30), r.uniform(-30, -5)),
         "gaussian": patch,
         "gabor": lambda: (*patch(), r.uniform(-40, 40), r.uniform(0, 6)),
@@ -84,7 +85,7 @@ def random_scene(
 
 # Every kind, paint and join, in families of few structures: each structure costs seconds to compile.
 FAMILIES: dict[str, list[Structure]] = {
-    "plain": [(Part("circle"),), (Part("box"),)],
+    "plain": [(Part("circle"),), (Part("box"),), (Part("arc"),)],
     "union": [(Part("circle"), Part("triangle", "linear", "union")), (Part("ellipse", "linear"),)],
     "cut": [
         (Part("box", "linear"), Part("circle", join="subtraction"), Part("ellipse", join="intersection")),

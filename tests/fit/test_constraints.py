@@ -22,6 +22,7 @@ SHAPES = {
     "box, corners cut to its size": (0.0, 0.1, 0.4, 0.2, 1.1, 0.9),
     "triangle": (-0.4, -0.3, 0.5, -0.1, 0.1, 0.45),
     "triangle, turned over": (0.5, -0.1, -0.4, -0.3, 0.1, 0.45),
+    "arc": (-0.4, -0.1, 0.4, -0.1, 0.0, 0.08),
     "displaced": (0.0, 0.0, 0.35, 0.02, 12.0, 9.0),
 }
 DEVIATIONS = (0.1, 0.0, 0.4, 0.15, 0.7)  # of a patch, which has no edge
@@ -63,6 +64,15 @@ def test_areas_and_thickness_are_those_of_the_distance(name):
     along = points @ torch.stack([turns.cos(), turns.sin()])
     width = float((along.amax(dim=0) - along.amin(dim=0)).min())
     assert width == pytest.approx(thickness, rel=0.06 if kind == "displaced" else 0.01)
+
+
+@pytest.mark.parametrize("sagitta", [-0.1, 0.3])
+def test_an_arc_has_about_the_area_of_a_pen_along_it(sagitta):
+    """Up to nearly half a circle."""
+    numbers = (-0.35, 0.0, 0.35, 0.0, sagitta, 0.08)
+    assert len(inside("arc", numbers, 1200)) * 4 / 1200**2 == pytest.approx(
+        measured("arc", numbers)[0], rel=0.02
+    )
 
 
 def test_every_kind_is_measured():

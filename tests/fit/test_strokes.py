@@ -148,15 +148,15 @@ def off(scene, pixels):
 
 PULSE = [(15, 50), (40, 50), (55, 20), (70, 80), (85, 50), (105, 50)]
 DRAWINGS = {
-    "pulse": (np.any([line(a, b, 4) for a, b in pairwise(PULSE)], axis=0), [["box"]] * 5),
+    "pulse": (np.any([line(a, b, 4) for a, b in pairwise(PULSE)], axis=0), [["arc"]] * 5),
     "hook": (
         line((20, 60), (60, 60), 4) | bow((60, 40), 20, 0, 90, 4) | line((80, 15), (80, 40), 4),
-        [["box"], ["box"], ["circle", "circle", "triangle"]],
+        [["arc"]] * 3,
     ),
-    "horseshoe": (bow((60, 55), 30, 150, 240, 5), [["circle", "circle", "triangle", "circle", "circle"]]),
+    "horseshoe": (bow((60, 55), 30, 150, 240, 5), [["arc"]]),
     "crossed out": (
         frame((60, 50), (45, 38), 12, 4) | line((45, 35), (75, 65), 4) | line((45, 65), (75, 35), 4),
-        [["box"], ["box"], ["box", "box"]],
+        [["arc"], ["arc"], ["box", "box"]],
     ),
 }
 

@@ -71,7 +71,14 @@ def region_of_group(group: Group, drawing: Drawing) -> Region | None:
 
 
 def region_of(figure: Figure) -> Region:
-    """The box of a figure and what its blur reaches, each side for itself."""
+    """The box of a figure and what its blur reaches, each side for itself; of a stroke in user units, for an element's
+    box is that of its middle line.
+    """
+    if isinstance(figure.geometry, ArcOutline):
+        points, reach = _points_of(figure.geometry), REACH * figure.blur + figure.geometry.half_width
+        low, high = np.floor(points.min(axis=0) - reach), np.ceil(points.max(axis=0) + reach)
+        (left, top), (width, height) = low.tolist(), (high - low).tolist()
+        return Region(left, top, width, height, True)
     wanted = REACH * figure.blur / np.maximum(box_of(figure.geometry) + 2.0 * rounding_of(figure), SMALLEST)
     return Region.around(*_stepped(wanted).tolist())
 
@@ -183,6 +190,11 @@ def box_of(geometry: Geometry) -> Points:
     if isinstance(geometry, PolygonOutline):
         return np.asarray(np.ptp(np.array(geometry.points), axis=0))
     if isinstance(geometry, ArcOutline):
-        return np.asarray(np.ptp(middle_line(geometry).at(np.linspace(0.0, 1.0, ALONG)), axis=0))
+        return np.asarray(np.ptp(_points_of(geometry), axis=0))
     points = [point for contour in geometry.contours for point in contour.points]
     return np.asarray(np.ptp(np.array(points), axis=0))
+
+
+def _points_of(arc: ArcOutline) -> Points:
+    """Points [N, 2] that a pen goes along."""
+    return middle_line(arc).at(np.linspace(0.0, 1.0, ALONG))
