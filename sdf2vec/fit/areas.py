@@ -35,6 +35,7 @@ BITTEN = 0.05  # share of what is cut out of a shape that is beyond its edge: a 
 PRICE = 0.04  # of a number, in logarithms of what is missed
 FULL, BLURRED = np.ones((3, 3)), 2  # pixels on both sides of an edge that may be of both colours
 CIRCLE = "circle"
+NEAR = 2  # pixels around what is looked at
 TINY = 1e-9
 
 
@@ -119,11 +120,27 @@ class Area:
     soft: bool  # its edge
 
     @property
-    def key(self) -> tuple[bytes, ...]:
-        """What its outline follows from."""
+    def name(self) -> tuple[bytes, ...]:
+        """What tells it from others, whatever is known around it."""
         x, y, pixel = self.around.points
         ends = torch.stack([x[0], y[0], pixel])
-        return tuple(tensor.numpy().tobytes() for tensor in (self.inside, self.known, ends))
+        return self.overlay.color.tobytes(), self.inside.numpy().tobytes(), ends.numpy().tobytes()
+
+    @property
+    def key(self) -> tuple[bytes, ...]:
+        """What its outline follows from."""
+        return *self.name, self.known.numpy().tobytes()
+
+    @property
+    def near(self) -> bytes:
+        """What is known next to it and in its box."""
+        inside, known = (self.around.plane(mask > 0.5) for mask in (self.inside, self.known))
+        rows, columns = (np.flatnonzero(inside.any(axis=axis)) for axis in (1, 0))
+        if not len(rows):
+            return b""
+        low, high = (np.array([rows[end], columns[end]]) for end in (0, -1))
+        (top, left), (bottom, right) = np.maximum(low - NEAR, 0), high + NEAR + 1
+        return known[top:bottom, left:right].tobytes()
 
     @cached_property
     def edge(self) -> float:

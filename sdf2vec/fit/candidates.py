@@ -36,6 +36,7 @@ SAME = 1e-4  # part of an error by which two starts differ at least
 BLURS, STEPS = (3.0, 1.0), 4  # sizes of a pixel in pixels, one after the other; steps with each
 START_SMOOTHNESS = 0.003  # scene units
 EAGER = 0.25  # how much an error matters where a first shape is not wanted: what is too much can be cut out
+ARC = "arc"
 LONGER = 1.2  # than wide: most kinds of shape at their start
 SHARP_AND_WHITE = {OPACITY: 1.0, FALLOFF: 0.0, COLOR: 1.0}
 FAINT = 1e-8  # of a squared change of the picture

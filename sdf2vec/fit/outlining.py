@@ -61,7 +61,7 @@ def best_outlined(area: Area, fine: Area, search: Search) -> Outlined | None:
         return best
     # chances of its own: what is tried from here on changes nothing that is found elsewhere
     proposer = replace(proposer, generator=torch.Generator().manual_seed(0))
-    if fine.outlined(best.layer).off >= FINELY_EXACT and (layers := stroked(fine, proposer)):
+    if fine.outlined(best.layer).off >= FINELY_EXACT and (layers := stroked(fine, search.kinds)):
         drawn = area.outlined_together(layers)
         if drawn.off < TOGETHER:
             return drawn

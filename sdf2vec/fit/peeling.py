@@ -64,12 +64,16 @@ def peeled(scene: SceneTensors, views: Sequence[View], search: Search) -> SceneT
 
 @dataclass(frozen=True)
 class Outlines:
-    """What the outlines of overlays were found to be; the surroundings rise in size."""
+    """What the outlines of overlays were found to be; the surroundings rise in size.
+
+    `before`: what each was the last time it was told, and what was known next to it then.
+    """
 
     scene: SceneTensors
     around: Sequence[Surroundings]
     search: Search
     done: dict[tuple[bytes, ...], Outlined | None] = field(default_factory=dict)
+    before: dict[tuple[bytes, ...], tuple[bytes, Outlined]] = field(default_factory=dict)
 
     def topmost(self, regions: Regions) -> list[Outlined]:
         """The layer that lies on top of some regions, of plain ones all that are no neighbours; none if none is told.
@@ -131,11 +135,23 @@ class Outlines:
         return bool(((hidden > HIDDEN * regions.areas) & ~best.overlay.inside).any())
 
     def _of(self, area: Area, fine: Area) -> Outlined | None:
-        """The shape that comes nearest to an overlay, or a shape with another cut out of it; None for no pixel."""
+        """The shape that comes nearest to an overlay, or a shape with another cut out of it; None for no pixel.
+
+        What it was before, where what is next to it is what it was, too, or where nothing better is found now.
+        """
         key = (*area.key, *fine.key)
-        if key not in self.done:
-            self.done[key] = best_outlined(area, fine, self.search)
-        return self.done[key]
+        if key in self.done:
+            return self.done[key]
+        near = fine.near
+        then, old = self.before.get(fine.name, (b"", None))
+        again = replace(area.outlined_together(old.all), bitten=old.bitten) if old else None
+        found = again if again and again.is_good and then == near else best_outlined(area, fine, self.search)
+        if again and again.is_good and (found is None or not found.is_good or again.score < found.score):
+            found = again
+        if found and found.is_good:
+            self.before[fine.name] = near, found
+        self.done[key] = found
+        return found
 
     def _areas(self, own: Part, overlay: Overlay, regions: Regions) -> tuple[Area, Area]:
         """Where an overlay is, in a window around a part of the largest surroundings in which that has at most `POINTS`

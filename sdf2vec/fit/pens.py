@@ -9,13 +9,13 @@ import torch
 from ..layer import Part, slots
 from ..paints import FLAT
 from ..render.tensors import Group, SceneTensors
+from .candidates import ARC
 from .covering import BOX
 from .joining import Search, detached, inserted
 from .least_squares import is_simple
 from .simplify import UNSEEN
 from .surroundings import Surroundings, View, error_of, layer_at
 
-ARC = "arc"
 STEPS = 10  # of a box whose corners have become round
 LONG = 1.5  # times as long as wide
 ALIKE, SAME = 0.06, 1e-4  # logarithm of what widths of one pen differ by; of what they do when they are one

@@ -5,7 +5,7 @@ boxes out of which others are cut.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Collection, Iterator, Sequence
 
 import numpy as np
 import torch
@@ -16,18 +16,17 @@ from ..paints import FLAT
 from ..render.tensors import Group
 from .arcs import WIDEST, wedge
 from .areas import CIRCLE, Area
-from .candidates import Opening, Proposer, joined_sharply
+from .candidates import ARC, Opening, joined_sharply
 from .covering import BOX, TRIANGLE, with_triangle
 from .frames import Frame, framed
-from .pens import ARC
 from .strokes import Bow, Line, Stroke, strokes
 
 KINDS_OF_STROKES = frozenset((BOX, CIRCLE, TRIANGLE, ARC))
 
 
-def stroked(area: Area, proposer: Proposer) -> list[Group]:
+def stroked(area: Area, kinds: Collection[str]) -> list[Group]:
     """Those of an area that is made of strokes; else none, nor where there may be no shapes of their kinds."""
-    if not set(proposer.kinds) >= KINDS_OF_STROKES:
+    if not KINDS_OF_STROKES.issubset(kinds):
         return []
     return layers_of(framed(strokes(area.coverage), area.coverage > 0.5), area)
 

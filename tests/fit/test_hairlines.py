@@ -146,7 +146,8 @@ def test_a_chart_is_its_lines():
         (line(50, 30, 88, 44, 1.5), RED, 1.0),
     )
     scene = fit(Picture(pixels.astype(np.float32)), seed=0)
-    assert [shape.kind for layer in scene.layers for shape in layer.shapes] == ["box"] * 4
+    assert len(scene.layers) == 4
+    assert {shape.kind for layer in scene.layers for shape in layer.shapes} <= {"box", "arc"}
     assert -10 * np.log10(np.mean((render(scene) - pixels) ** 2)) > 38
 
 
