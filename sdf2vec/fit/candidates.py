@@ -243,6 +243,10 @@ class Proposer:
     numbers: Callable[[Structure, Callable[[Slot], bool]], Numbers]
     tick: Callable[[float], None]
 
+    def without(self, kind: str) -> Proposer:
+        """The same for all other kinds, if there are any."""
+        return replace(self, kinds=tuple(each for each in self.kinds if each != kind) or self.kinds)
+
     def candidates(self, places: Sequence[Opening], around: Surroundings) -> list[list[Tried]]:
         """For each opening a layer with the best shape of every kind in it; errors are estimates."""
         starts = [self.placed(place.mask.gain, around) for place in places]

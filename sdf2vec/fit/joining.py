@@ -20,7 +20,7 @@ from ..render.tensors import Group, SceneTensors
 from ..shapes import KINDS
 from ..units import FALLOFF, SMOOTHNESS
 from .adam import rate_of
-from .candidates import ARC, Opening, Proposer, Tried, alone, openings, reductions
+from .candidates import Opening, Proposer, Tried, alone, openings, reductions
 from .constraints import project_group, room_of
 from .initialization import Layers, straight
 from .levenberg import Numbers, descend
@@ -278,9 +278,10 @@ class Search:
         return tuple(kind for kind in self.layers.kinds if KINDS[kind].patch is None)
 
     def proposer(self, around: Surroundings) -> Proposer:
-        """What fits single shapes to masks; arcs are found as strokes, unless there are no others."""
-        kinds = tuple(kind for kind in self.kinds if kind != ARC) or self.kinds
-        return Proposer(kinds, self.layers.paint, self.generator, partial(self.numbers, around), self.tick)
+        """What fits single shapes to masks."""
+        return Proposer(
+            self.kinds, self.layers.paint, self.generator, partial(self.numbers, around), self.tick
+        )
 
     def _color(self, around: Surroundings) -> torch.Tensor:
         """The mean colour [1, 3] of what a layer should show."""

@@ -13,7 +13,7 @@ from ..layer import Structure
 from ..render.tensors import Group
 from .arcs import Arc
 from .areas import CIRCLE, EXACT, LEAST_OFF, Area, Outlined
-from .candidates import Opening, Proposer, joined_sharply, reductions
+from .candidates import ARC, Opening, Proposer, joined_sharply, reductions
 from .covering import Covering
 from .joining import Search
 from .stroking import stroked
@@ -34,7 +34,7 @@ def best_outlined(area: Area, fine: Area, search: Search) -> Outlined | None:
     """The best that shapes of all kinds come to, of those that are good what is so in the finest surroundings, too;
     None where there is less than a pixel.
     """
-    proposer = search.proposer(area.around)
+    proposer = search.proposer(area.around).without(ARC)  # of which ends are round: strokes tell, or the rest
     plain = _single(area, area.opening(), proposer) if area.inside.max() > 0.5 else []
     if not plain:
         return None
