@@ -11,6 +11,7 @@ from sdf2vec.api import render
 from sdf2vec.fit import descents, peeling, pruning, sparse
 from sdf2vec.fit.auto import Drawing
 from sdf2vec.fit.drawings import Drawn
+from sdf2vec.fit.outlining import best_outlined
 from sdf2vec.fit.peeling import peeled
 from sdf2vec.fit.region_graph import Regions
 from sdf2vec.fit.settings import settings_of
@@ -325,6 +326,22 @@ def test_thirty_dots_are_thirty_circles():
     assert sorted(away.argmin(axis=1)) == list(range(30))
     assert away.min(axis=1).max() < 0.3 / SIDE
     assert found[:, 2] == pytest.approx(3.2 / SIDE, abs=0.3 / SIDE)
+
+
+def test_what_was_told_once_is_not_looked_for_again(monkeypatch):
+    """Three frames, which wait until the discs between them are taken off."""
+    looked_for = []
+
+    def counted(area, fine, search):
+        looked_for.append(area)
+        return best_outlined(area, fine, search)
+
+    monkeypatch.setattr(peeling, "best_outlined", counted)
+    places = (20, 48, 76)
+    frames = [(box(x - 11, 30, x + 11, 52) & ~box(x - 4, 37, x + 4, 45), BLUE, 1.0) for x in places]
+    layers = apart(painted(*frames, *((disc(x, 58, 4), RED, 1.0) for x in places)))
+    assert sorted(len(layer.shapes) for layer in layers) == [1, 1, 1, 2, 2, 2]
+    assert len(looked_for) == 6
 
 
 def test_where_hardly_any_region_is_a_shape_the_rest_is_left(monkeypatch):

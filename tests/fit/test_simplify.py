@@ -24,7 +24,7 @@ RED, ALMOST = (0.8, 0.1, 0.2), (0.802, 0.1, 0.199)
 def as_simple_as_drawn(scene, drawn, worst=0.0):
     view = View(draw(drawn)[:3], None)
     search = Search(
-        Layers(("circle", "box"), "over"), (0.0, 1.0), torch.Generator(), lambda loss: None, 1 / 48
+        Layers(("circle", "box", "arc"), "over"), (0.0, 1.0), torch.Generator(), lambda loss: None, 1 / 48
     )
     made = simplified(from_scene(scene), view, search, worst)
     return to_scene(sharing(made, view, worst), 48, 48)
@@ -64,6 +64,21 @@ def test_joins_that_are_seen_to_be_smooth_stay_so():
     joined = Scene(48, 48, (Layer(shapes, joints=(Joint("union", 0.06),)),), (1.0, 1.0, 1.0))
     (layer,) = as_simple_as_drawn(joined, joined).layers
     assert layer.joints[0].smoothness > 0.04
+
+
+def arc(sagitta):
+    numbers = {"a": (-0.3, -0.1), "b": (0.3, 0.1), "sagitta": sagitta, "half_width": 0.06}
+    return scene(Shape.of("arc", RED, **numbers))
+
+
+def test_what_is_hardly_bent_is_straight():
+    (found,) = as_simple_as_drawn(arc(0.005), arc(0.0), 1e-5).layers[0].shapes
+    assert found.parameters[4] == 0.0
+
+
+def test_what_is_seen_to_be_bent_stays_so():
+    (found,) = as_simple_as_drawn(arc(0.018), arc(0.018), 1e-7).layers[0].shapes
+    assert found.parameters[4] > 0.01
 
 
 def test_colours_that_are_close_become_one():

@@ -114,7 +114,7 @@ def test_derivatives_of_the_whole_render(compositing, transparent):
                 values.append(float(loss()))
             flat[index] = before
             central = (values[0] - values[1]) / 2e-6
-            assert float(grad.view(-1)[index]) == pytest.approx(central, rel=1e-4, abs=1e-5)
+            assert float(grad.reshape(-1)[index]) == pytest.approx(central, rel=1e-4, abs=1e-5)
 
 
 def test_a_scene_survives_the_way_through_tensors():

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from sdf2vec.export.svg.display import Drawing, Figure
-from sdf2vec.export.svg.filter_regions import Region, shared_regions
-from sdf2vec.outlines import EllipseOutline, PolygonOutline
+from sdf2vec.export.svg.filter_regions import Region, region_of, shared_regions
+from sdf2vec.outlines import ArcOutline, EllipseOutline, PolygonOutline
 
 BLACK = (0.0, 0.0, 0.0)
 SIZE = (200.0, 100.0)
@@ -43,6 +43,14 @@ def test_what_has_no_height_but_a_stroke_has_a_region_in_user_units(height: floa
     bar = PolygonOutline(((50.0, 50.0), (90.0, 50.0), (90.0, 50.0 + height)), 10.0)
     (region,) = regions(Figure(bar, BLACK, blur=2.0))
     assert region == Region(-6.0, -6.0, 212.0, 112.0, in_user_units=True)
+
+
+def test_the_region_of_a_stroke_holds_it_and_what_a_blur_reaches() -> None:
+    """Its element's box is that of its middle line, here 40 wide and 20 high, and does not hold its width."""
+    half_turn = Figure(ArcOutline((30.0, 60.0), (70.0, 60.0), -20.0, 5.0), BLACK, blur=2.0)
+    assert region_of(half_turn) == pytest.approx(Region(19.0, 29.0, 62.0, 42.0, True), abs=1.01)
+    (shared,) = regions(half_turn)
+    assert np.array(shared[:4]) * (40, 20, 40, 20) == pytest.approx([-11, -11, 62, 42], abs=2.0)
 
 
 def test_a_turned_ellipse_has_units_of_its_own_and_keeps_its_box() -> None:

@@ -33,7 +33,12 @@ def stroke(start, end, half=0.06, color=ORANGE):
     return Layer((shape,))
 
 
+def arc(start, end, sagitta, half=0.06):
+    return Layer((Shape.of("arc", ORANGE, a=start, b=end, sagitta=sagitta, half_width=half),))
+
+
 LINES = Scene(150, 100, tuple(stroke(*ends) for ends in ENDS), BLACK)
+BENT = Scene(150, 100, tuple(map(arc, *zip(*ENDS, strict=True), (0.0, -0.25, 0.5))), BLACK)
 
 
 def drawing_of(scene):
@@ -60,11 +65,18 @@ def test_another_pen_parts_them(other):
     assert len(paths_of(Scene(150, 100, (first, other, last), BLACK))) == 3
 
 
+def test_so_are_arcs():
+    """One of them of more than half a turn."""
+    (data,) = paths_of(BENT)
+    assert [len(re.findall(letter, data)) for letter in "Mla"] == [3, 1, 2]
+
+
+@pytest.mark.parametrize("scene", [LINES, BENT], ids=["lines", "arcs"])
 @pytest.mark.parametrize("size", [(150, 100), (411, 274)])
 @pytest.mark.parametrize("name", ["resvg", "librsvg", "chromium", "firefox", "cairosvg", "inkscape"])
-def test_engines_draw_them_as_they_are(name, size, require_engine):
+def test_engines_draw_them_as_they_are(name, size, scene, require_engine):
     """An antialiased edge differs from engine to engine; half a level is a pixel's tenth of it."""
     require_engine(name)
-    wrong = ENGINES[name].render(drawing_of(LINES), *size) - rendered(LINES, *size)
+    wrong = ENGINES[name].render(drawing_of(scene), *size) - rendered(scene, *size)
     assert -10 * np.log10(np.mean(wrong**2)) > 34
     assert abs(wrong[..., :3].mean()) < 0.002

@@ -17,7 +17,7 @@ from sdf2vec.export.svg.display import (
     Stop,
 )
 from sdf2vec.export.svg.writer import Style, number, written
-from sdf2vec.outlines import EllipseOutline, PolygonOutline, RectangleOutline
+from sdf2vec.outlines import ArcOutline, EllipseOutline, PolygonOutline, RectangleOutline
 
 NAMESPACE = "{http://www.w3.org/2000/svg}"
 RED, BLUE = (1.0, 0.0, 0.0), (0.0, 0.0, 1.0)
@@ -116,6 +116,40 @@ def test_compact_words():
     rules, colors = root.findtext(f"{NAMESPACE}style", ""), ";fill:currentColor;stroke:currentColor"
     assert re.search(rf"\.{usual.get('class')}{{filter:url\(#\w+\){colors};stroke-width:8}}", rules)
     assert re.search(rf"\.{other.get('class')}{{filter:url\(#\w+\){colors}}}", rules)
+
+
+def test_a_bent_stroke_is_not_filled():
+    """Neither by itself, nor in a run with straight ones, nor where a class says its colour."""
+    bent, line = (
+        ArcOutline((10.0, 20.0), (30.0, 20.0), -4.0, 2.0),
+        ArcOutline((40.0, 9.0), (40.0, 30.0), 0.0, 2.0),
+    )
+    made = last(Figure(bent, RED, 0.5))
+    assert made.attrib == {
+        "d": "M10 20a14.5 14.5 0 0 1 20 0",  # its radius is (10² + 4²) / 8
+        "fill": "none",
+        "stroke": "#f00",
+        "stroke-width": "4",
+        "stroke-linecap": "round",
+        "opacity": ".5",
+    }
+    compact = Style(named=False, compact=True)
+    (run,) = last(Figure(line, RED), Figure(bent, RED), style=compact)
+    assert run.get("d") == "M40 9l0 21M10 20a14.5 14.5 0 0 1 20 0"
+    assert run.get("fill") == "none"
+    (straight,) = last(Figure(line, RED), style=compact)
+    assert straight.get("fill") is None
+    root = parsed(Figure(bent, RED, 0.5, blur=2.0), style=compact)
+    rule = root.findtext(f"{NAMESPACE}style", "")
+    assert ";fill:none;stroke:currentColor;stroke-width:4}" in rule
+
+
+def test_more_than_half_a_turn_is_the_larger_part():
+    nearly_round = ArcOutline((19.0, 20.0), (21.0, 20.0), -20.0, 1.0)
+    data = last(Figure(nearly_round, RED)).get("d")
+    assert (
+        len(re.findall("a10", data)) + len(re.findall(" 10 10", data)) == 3
+    )  # whatever its radius is rounded to
 
 
 def test_a_turned_ellipse():
