@@ -137,12 +137,6 @@ class Bow:
         more = self.half / self.radius if self.square else 0.0
         return self.first - more, self.span + 2.0 * more
 
-    @property
-    def without_ends(self) -> Bow:
-        """What is left of it between rays from its middle to its ends."""
-        more = self.half / self.radius
-        return replace(self, first=self.first + more, span=max(self.span - 2.0 * more, 0.0), square=True)
-
     def covers(self, points: Float64Array) -> BoolArray:
         """Which points [N, 2] it covers."""
         away, (first, span) = points - self.middle, self.sector
