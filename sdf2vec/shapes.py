@@ -229,11 +229,9 @@ def _along(chord: Expr, across: Expr) -> Expr:
 
 @function("sdArc", p=VEC2, a=VEC2, b=VEC2, sagitta=FLOAT, half_width=FLOAT)
 def sd_arc(p: Expr, a: Expr, b: Expr, sagitta: Expr, half_width: Expr) -> Expr:
-    """Exact distance to an arc of a circle from a to b, drawn with a round pen; no sagitta: a line.
-
-    The distance to the circle is that of Inigo Quilez' "2D distance functions", times (its radius + distance to its
-    middle) in numerator and denominator, so that nothing is infinite where it is flat.
-    """
+    """Exact distance to a round pen's arc of a circle from a to b; a line without sagitta (after Inigo Quilez)."""
+    # the distance to the circle (Inigo Quilez, "2D distance functions") times that to its middle plus its radius, over
+    # the same: nothing is infinite where it is flat
     chord = let("chord", b - a)
     across = let("across", length(chord))
     q = let("q", rotate(p - (a + b) * 0.5, _along(chord, across)))

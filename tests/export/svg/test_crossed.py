@@ -103,7 +103,9 @@ def test_a_stroke_out_of_which_a_disc_is_cut():
     found = [segment for contour in outline(stroke).contours for segment in contour.segments]
     assert all(isinstance(segment, Arc) for segment in found)
     assert {round(arc.radii[0], 3) for arc in found if isinstance(arc, Arc)} == {35.0, 25.0, 10.0, 5.0}
-    lower = [point for contour in outline(stroke).contours for point in contour.points if round(point[1]) == 50]
+    lower = [
+        point for contour in outline(stroke).contours for point in contour.points if round(point[1]) == 50
+    ]
     assert sorted({(round(x), round(y)) for x, y in lower}) == [(15, 50), (25, 50), (75, 50), (85, 50)]
 
 
