@@ -5,6 +5,7 @@ import pytest
 import sdf2vec
 from sdf2vec.export.dense_text import dense
 from sdf2vec.roundtrip import ROUND_TRIPS, compare
+from sdf2vec.shapes import KINDS
 from tests.scenes import random_scene
 
 
@@ -77,7 +78,10 @@ def test_names_of_one_type_are_declared_together(text, wanted):
 def test_the_smallest_text_draws_the_same(target, compositing, require_engine):
     trip = ROUND_TRIPS[target][0]
     require_engine(trip.engine)
-    scene = random_scene(compositing=compositing, layers=9, seed=4)
+    kinds = [
+        kind for kind in KINDS if kind != "arc"
+    ]  # with arcs, words of few bits would be smaller than numbers
+    scene = random_scene(kinds, compositing=compositing, layers=9, seed=4)
     made = sdf2vec.exported(scene, target, framing="fit", max_bytes=10)
     assert len(made.raw) < 0.8 * len(sdf2vec.exported(scene, target, framing="fit").raw)
     assert compare(trip, made, scene, (60, 40)).largest_error < 0.25 + made.error
