@@ -63,7 +63,7 @@ def soft_scene(background=(0.3, 0.4, 0.5)):
     r = random.Random(3)
     layers = []
     for index in range(12):
-        shape = random_shape(sorted(SOFT)[index % 5], r)
+        shape = random_shape(sorted(SOFT)[index % len(SOFT)], r)
         layers.append(Layer((shape,), r.uniform(0.05, 0.4), r.uniform(0.3, 1.0)))
     return Scene(150, 100, tuple(layers), background)
 
