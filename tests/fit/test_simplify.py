@@ -72,7 +72,7 @@ def arc(sagitta):
 
 
 def test_what_is_hardly_bent_is_straight():
-    (found,) = as_simple_as_drawn(arc(0.005), arc(0.0), 1e-5).layers[0].shapes
+    (found,) = as_simple_as_drawn(arc(0.005), arc(0.001), 1e-5).layers[0].shapes
     assert found.parameters[4] == 0.0
 
 
