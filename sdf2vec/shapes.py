@@ -286,8 +286,8 @@ def _arc_frame(a: Expr, b: Expr, sagitta: Expr, half_width: Expr) -> Frame:
     """Along the chord, around the arc unless it is more than half a circle."""
     across = length(b - a)
     along = _along(b - a, across)
-    middle = (a + b + vec2(-along.y, along.x) * sagitta) * 0.5
-    return Frame(middle, along, vec2(0.5 * across, 0.5 * absolute(sagitta)) + half_width)
+    top, _ = _arc_top(a, b, sagitta)
+    return Frame((top + (a + b) * 0.5) * 0.5, along, vec2(0.5 * across, 0.5 * absolute(sagitta)) + half_width)
 
 
 def _arc_outline(offset: float, a: Point, b: Point, sagitta: float, half_width: float) -> Outline:

@@ -140,18 +140,23 @@ class Outlines:
         What it was before, where what is next to it is what it was, too, or where nothing better is found now.
         """
         key = (*area.key, *fine.key)
-        if key in self.done:
-            return self.done[key]
-        near = fine.near
-        then, old = self.before.get(fine.name, (b"", None))
-        again = replace(area.outlined_together(old.all), bitten=old.bitten) if old else None
-        found = again if again and again.is_good and then == near else best_outlined(area, fine, self.search)
-        if again and again.is_good and (found is None or not found.is_good or again.score < found.score):
-            found = again
-        if found and found.is_good:
-            self.before[fine.name] = near, found
-        self.done[key] = found
-        return found
+        if key not in self.done:
+            self.done[key] = self._kept_or_found(area, fine)
+        return self.done[key]
+
+    def _kept_or_found(self, area: Area, fine: Area) -> Outlined | None:
+        name, near = fine.name, fine.near
+        then, old = self.before.get(name, (b"", None))
+        tried = [replace(area.outlined_together(old.all), bitten=old.bitten)] if old else []
+        good = [each for each in tried if each.is_good]
+        if then != near or not good:
+            found = best_outlined(area, fine, self.search)
+            good = [found, *good] if found and found.is_good else good
+            if not good:
+                return found
+        best = min(good, key=lambda each: each.score)
+        self.before[name] = near, best
+        return best
 
     def _areas(self, own: Part, overlay: Overlay, regions: Regions) -> tuple[Area, Area]:
         """Where an overlay is, in a window around a part of the largest surroundings in which that has at most `POINTS`

@@ -6,14 +6,14 @@ from collections.abc import Sequence
 
 import torch
 
-from ..layer import Part, slots
+from ..layer import Part
 from ..paints import FLAT
 from ..render.tensors import Group, SceneTensors
 from .candidates import ARC
 from .covering import BOX
 from .joining import Search, detached, inserted
 from .least_squares import is_simple
-from .simplify import UNSEEN
+from .simplify import UNSEEN, with_part
 from .surroundings import Surroundings, View, error_of, layer_at
 
 STEPS = 10  # of a box whose corners have become round
@@ -72,10 +72,8 @@ def _stroke_of(box: Group) -> Group:
     half = sides.amin(1, keepdim=True)
     reach, center = along * (sides.amax(1, keepdim=True) - half), box.of("center", 0)
     arc = {"a": center - reach, "b": center + reach, "sagitta": torch.zeros_like(half), "half_width": half}
-    structure = (box.structure[0]._replace(kind=ARC),)
-    kept = {slot: tensor for slot, tensor in box.values.items() if slot in slots(structure)}
-    values = {slot: kept[slot] if slot in kept else arc[slot.parameter.name] for slot in slots(structure)}
-    return Group(structure, box.order, values).each(lambda tensor: tensor.detach().clone())
+    made = with_part(box, 0, box.structure[0]._replace(kind=ARC), arc)
+    return made.each(lambda tensor: tensor.detach().clone())
 
 
 def _moved(layer: Group, around: Surroundings, search: Search) -> Group:

@@ -129,7 +129,7 @@ def _circle(layer: Group, view: View) -> Iterator[Change]:
         if part.kind != "circle" and part.paint == FLAT and KINDS[part.kind].patch is None:
             center, radius = middle_of(layer, index)
             yield (
-                _with_part(layer, index, part._replace(kind="circle"), {"center": center, "radius": radius}),
+                with_part(layer, index, part._replace(kind="circle"), {"center": center, "radius": radius}),
                 (),
             )
 
@@ -149,7 +149,7 @@ def _extent(kind: str) -> Callable[..., Tensors]:
     )
 
 
-def _with_part(layer: Group, index: int, part: Part, own: dict[str, torch.Tensor]) -> Group:
+def with_part(layer: Group, index: int, part: Part, own: dict[str, torch.Tensor]) -> Group:
     """The layer with another part in the place of one, of which these numbers are known; the rest is what it was."""
     structure = (*layer.structure[:index], part, *layer.structure[index + 1 :])
     new = {
@@ -167,7 +167,7 @@ def _flat(layer: Group, view: View) -> Iterator[Change]:
                 v for slot, v in layer.values.items() if slot.part == index and slot.parameter.unit is COLOR
             ]
             mean = torch.stack(colors).mean(0)
-            yield _with_part(layer, index, part._replace(paint=FLAT), {BASE.name: mean}), ()
+            yield with_part(layer, index, part._replace(paint=FLAT), {BASE.name: mean}), ()
 
 
 def _upright(layer: Group, view: View) -> Iterator[Change]:

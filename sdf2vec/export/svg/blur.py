@@ -80,10 +80,15 @@ def best_blur(layer: Layer, canvas: Canvas) -> Blurred | None:
 
 def _edges(outline: Outline, layer: Layer, grid: SampleGrid) -> list[tuple[Outline, Float64Array]]:
     """An outline with corners ever sharper, if it has any, and the distances [Y, X] to them."""
+    made = [outline] if core(outline) is None else [sharpened(outline, share) for share in SHARES]
+    return [(sharp, distances_from(sharp, layer, grid)) for sharp in made]
+
+
+def distances_from(outline: Outline, layer: Layer, grid: SampleGrid) -> Float64Array:
+    """Signed distances [Y, X] to an outline; if it is of no polygon, the layer's own, to where coverage is one half."""
     if core(outline) is None:
-        return [(outline, distances(layer, grid) - 0.5 * layer.falloff)]
-    made = [sharpened(outline, share) for share in SHARES]
-    return [(sharp, distance_to(sharp, grid)) for sharp in made]
+        return distances(layer, grid) - 0.5 * layer.falloff
+    return distance_to(outline, grid)
 
 
 def best_traced(layer: Layer, canvas: Canvas, deviation: float | None = None) -> Blurred | None:

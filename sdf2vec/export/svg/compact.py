@@ -18,12 +18,11 @@ from ...grain import Drawable, Grain, Run
 from ...outlines import ArcOutline, EllipseOutline, Outline, PolygonOutline
 from ...render.occlusion import showing
 from ...scene import Layer, Scene
-from .blur import best_traced, trial_of
+from .blur import best_traced, distances_from, trial_of
 from .canvas import Canvas, Points, pairs
 from .display import Drawing, Figure, Geometry, Group, Item, Path
-from .outlines import Traced, core, distance_to, edge_of, placed
+from .outlines import Traced, core, edge_of, placed
 from .refit_appearance import HASTY, Difference, refitted
-from .sampling import distances
 from .sharp_edges import NOWHERE, sharp_edge
 from .union_gradient import fill_of
 from .visibility import LayerSamples, contrasts, layers_at
@@ -141,9 +140,7 @@ def _blurred(layer: Layer, canvas: Canvas) -> tuple[Geometry, Difference | None]
     if outline is None:
         return _traced(layer, canvas)
     trial = trial_of(layer, canvas)
-    distance = distances(layer, trial.grid) - 0.5 * layer.falloff
-    if core(outline) is not None:
-        distance = distance_to(outline, trial.grid)
+    distance = distances_from(outline, layer, trial.grid)
     return _whole(outline, canvas), trial.judged(outline, distance, _deviation(layer)).difference.coarse()
 
 

@@ -18,7 +18,7 @@ from ...blend import JOINS, SHARPEST
 from ...expr import const, var, vec3, vec4
 from ...lower.numpy import compile_numpy
 from ...outlines import ArcOutline, EllipseOutline, Outline
-from ...scene import Layer
+from ...scene import Layer, Shape
 from .canvas import Canvas, Points
 from .display import Path
 from .isobands import seen
@@ -118,21 +118,12 @@ def _depths(outline: Outline, points: Points) -> Float64Array:
     if core(outline) is not None:
         return distance_at(outline, *points.T)
     if isinstance(outline, ArcOutline):
-        return _arc_depths(outline, points)
+        numbers = (*outline.start, *outline.end, outline.sagitta, outline.half_width)
+        return distance_of(Layer((Shape("arc", numbers),)), points)
     assert isinstance(outline, EllipseOutline)
     cosine, sine = math.cos(outline.angle), math.sin(outline.angle)
     turned = (points - outline.center) @ np.array([[cosine, -sine], [sine, cosine]]) / outline.radii
     return np.asarray(np.linalg.norm(turned, axis=1) - 1.0)
-
-
-def _arc_depths(outline: ArcOutline, points: Points) -> Float64Array:
-    line, radius = middle_line(outline), radius_of(outline)
-    away = points - line.start
-    turns = np.arctan2(away[:, 1], away[:, 0]) - line.first
-    is_beside = np.mod(math.copysign(1.0, line.span) * turns, math.tau) <= abs(line.span)
-    to_ends = [np.linalg.norm(points - end, axis=1) for end in (line.begin, line.end)]
-    off = np.where(is_beside, np.abs(np.linalg.norm(away, axis=1) - radius), np.minimum(*to_ends))
-    return np.asarray(off - outline.half_width)
 
 
 def _joined(joins: Sequence[str], inside: Sequence[BoolArray]) -> BoolArray:
