@@ -16,17 +16,17 @@ from .operation import COMPONENTS
 def walk(roots: Iterable[Expr]) -> Iterator[Expr]:
     """Every node once, arguments before what uses them."""
     seen: set[Expr] = set()
-    stack = [(root, False) for root in reversed(list(roots))]
+    stack = list(roots)[::-1]
     while stack:
-        node, ready = stack.pop()
-        if node in seen:
+        node = stack[-1]
+        before = [] if node in seen else [arg for arg in node.args[::-1] if arg not in seen]
+        if before:
+            stack += before
             continue
-        if ready:
+        stack.pop()
+        if node not in seen:
             seen.add(node)
             yield node
-        else:
-            stack.append((node, True))
-            stack.extend((arg, False) for arg in reversed(node.args))
 
 
 def substitute(expr: Expr, values: Mapping[Expr, Expr]) -> Expr:

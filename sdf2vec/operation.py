@@ -23,10 +23,10 @@ class Type(Enum):
     VEC3 = "vec3"
     VEC4 = "vec4"
 
-    @property
-    def width(self) -> int:
-        """Number of scalar components."""
-        return {"vec2": 2, "vec3": 3, "vec4": 4}.get(self.value, 1)
+    def __init__(self, name: str) -> None:
+        self.width = {"vec2": 2, "vec3": 3, "vec4": 4}.get(name, 1)  # scalar components
+
+    __hash__ = object.__hash__  # an Enum's own hashes its name anew each time
 
 
 BOOL, FLOAT, VEC2, VEC3, VEC4 = Type
@@ -73,8 +73,8 @@ class Operation:
 
 def widest(types: Sequence[Type]) -> Type:
     """Floats broadcast to the one vector type present."""
-    vectors = {type for type in types if type.width > 1}
-    if len(vectors) > 1 or BOOL in types:
+    vectors = set(types) - {FLOAT}
+    if len(vectors) > 1 or BOOL in vectors:
         raise TypeError(f"types do not fit: {[type.value for type in types]}")
     return vectors.pop() if vectors else FLOAT
 

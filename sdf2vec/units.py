@@ -57,6 +57,9 @@ class Fractions(NamedTuple):
     ranges: Mapping[str, tuple[float, float]]
 
 
+Within = tuple[tuple[float, float], ...]  # least and most of each number of a parameter, or of all
+
+
 def _itself(value: Any) -> Any:
     return value
 
@@ -94,20 +97,34 @@ class Unit:
     `low` and `high` bound it in a scene, where it has so many `decimals`. `rate` is Adam's for one step on a canvas
     of area 1; it grows with the power `scaling` of the square root of the canvas' area, and falls with the number of
     layers where they are `crowded`. `start(values, placed)` is where a parameter starts, [N, width], whose values are
-    for a shape of size 1 at the origin. `project(values, positive, room)` moves a fit's values [N, width] into their
-    range, in place.
+    for a shape of size 1 at the origin. `within(positive, room)`: the least and the most that a fit may make of each of
+    its numbers, or of all. Values a `period` apart are one, if that is not 0; of those that `rest` a 0 stays.
     """
 
     name: str
     low: float
     high: float
     rate: float
-    project: Callable[[Any, bool, Room], None]
+    within: Callable[[bool, Room], Within]
     codec: Codec
     start: Callable[[tuple[float, ...], Placed], Any] | None = None
     decimals: int = GEOMETRY_DECIMALS
     scaling: int = 0
     crowded: bool = False
+    period: float = 0.0
+    rests: bool = False
+
+    def project(self, values: Any, positive: bool, room: Room) -> None:
+        """Moves a fit's values [N, width], a tensor, into their range, in place."""
+        if self.period:
+            values.remainder_(self.period)
+            return
+        kept = values.clone() if self.rests else values
+        within = self.within(positive, room)
+        for ends, some in zip(within, [values] if len(within) == 1 else values.unbind(-1), strict=True):
+            some.clamp_(*ends)
+        if self.rests:
+            values.copy_(values.where(kept != 0.0, kept))
 
 
 @dataclass(frozen=True)
@@ -182,43 +199,33 @@ def _start_frequency(values: tuple[float, ...], placed: Placed) -> Any:
 # --- what a fit may make of them -----------------------------------------------------------------------------
 
 
-def _keep_position(values: Any, positive: bool, room: Room) -> None:
-    for axis, side in enumerate(room.size):
-        values[..., axis].clamp_(-side / 2 - MARGIN, side / 2 + MARGIN)
+def _position_within(positive: bool, room: Room) -> Within:
+    return tuple((-side / 2 - MARGIN, side / 2 + MARGIN) for side in room.size)
 
 
-def _keep_length(values: Any, positive: bool, room: Room) -> None:
-    values.clamp_(room.pixel if positive else 0.0, LONGEST * max(room.size))
+def _length_within(positive: bool, room: Room) -> Within:
+    return ((room.pixel if positive else 0.0, LONGEST * max(room.size)),)
 
 
-def _keep_offset(values: Any, positive: bool, room: Room) -> None:
+def _offset_within(positive: bool, room: Room) -> Within:
     longest = LONGEST * max(room.size)
-    values.clamp_(-longest, longest)
+    return ((-longest, longest),)
 
 
-def _keep_angle(values: Any, positive: bool, room: Room) -> None:
-    values.remainder_(math.tau)
+def _always_within(low: float, high: float) -> Callable[[bool, Room], Within]:
+    return lambda positive, room: ((low, high),)
 
 
-def _keep_smoothness(values: Any, positive: bool, room: Room) -> None:
-    """What is sharp stays so; what is not does not become so by chance, for no derivative would lead back."""
-    values.copy_(values.where(values == 0.0, values.clamp(LEAST_SMOOTHNESS, LONGEST)))
+def _color_within(positive: bool, room: Room) -> Within:
+    return ((-1.0 if room.signed else 0.0, 1.0),)
 
 
-def _keep_within(low: float, high: float) -> Callable[[Any, bool, Room], None]:
-    return lambda values, positive, room: values.clamp_(low, high)
+def _opacity_within(positive: bool, room: Room) -> Within:
+    return ((-1.0 if room.signed else FAINTEST, 1.0),)
 
 
-def _keep_color(values: Any, positive: bool, room: Room) -> None:
-    values.clamp_(-1.0 if room.signed else 0.0, 1.0)
-
-
-def _keep_opacity(values: Any, positive: bool, room: Room) -> None:
-    values.clamp_(-1.0 if room.signed else FAINTEST, 1.0)
-
-
-def _keep_falloff(values: Any, positive: bool, room: Room) -> None:
-    values.clamp_(*room.falloff)
+def _falloff_within(positive: bool, room: Room) -> Within:
+    return (room.falloff,)
 
 
 # --- how a packed scene says them ----------------------------------------------------------------------------
@@ -292,33 +299,42 @@ POSITION = Unit(
     -LONGEST_CANVAS,
     LONGEST_CANVAS,
     0.01,
-    _keep_position,
+    _position_within,
     _PLACE,
     _start_position,
     scaling=1,
     crowded=True,
 )
 LENGTH = Unit(
-    "length", 0.0, LONGEST_CANVAS, 0.003, _keep_length, _SPAN, _start_length, scaling=1, crowded=True
+    "length", 0.0, LONGEST_CANVAS, 0.003, _length_within, _SPAN, _start_length, scaling=1, crowded=True
 )
 OFFSET = Unit(  # a length to one side or the other
     "offset",
     -LONGEST_CANVAS,
     LONGEST_CANVAS,
     0.006,
-    _keep_offset,
+    _offset_within,
     Codec(_signed_share_of_span),
     _start_length,
     scaling=1,
     crowded=True,
 )
-ANGLE = Unit("angle", -1000.0, 1000.0, 0.03, _keep_angle, _TURN, _start_angle)
+ANGLE = Unit(
+    "angle",
+    -1000.0,
+    1000.0,
+    0.03,
+    _always_within(0.0, math.tau),
+    _TURN,
+    _start_angle,
+    period=math.tau,
+)
 FREQUENCY = Unit(
     "frequency",
     -1000.0,
     1000.0,
     0.3,
-    _keep_within(-HIGHEST_FREQUENCY, HIGHEST_FREQUENCY),
+    _always_within(-HIGHEST_FREQUENCY, HIGHEST_FREQUENCY),
     Codec(_between("frequency")),
     _start_frequency,
     scaling=-1,
@@ -328,7 +344,7 @@ DIRECTION = Unit(
     -1000.0,
     1000.0,
     0.06,
-    _keep_within(-STEEPEST, STEEPEST),
+    _always_within(-STEEPEST, STEEPEST),
     Codec(_between("direction")),
     _turned,
 )
@@ -337,7 +353,7 @@ COLOR = Unit(
     -1.0,
     1.0,
     0.014,
-    _keep_color,
+    _color_within,
     Codec(_between("color"), "color", stride=1),
     decimals=COLOR_DECIMALS,
     crowded=True,
@@ -347,7 +363,7 @@ OPACITY = Unit(
     -1.0,
     1.0,
     0.01,
-    _keep_opacity,
+    _opacity_within,
     Codec(_between("opacity"), "opacity"),
     decimals=COLOR_DECIMALS,
     crowded=True,
@@ -357,7 +373,7 @@ FALLOFF = Unit(
     0.0,
     LONGEST_CANVAS,
     0.01,
-    _keep_falloff,
+    _falloff_within,
     Codec(_grown_between("falloff"), "falloff", _root, _grown, grown),
     scaling=1,
     crowded=True,
@@ -367,17 +383,19 @@ SMOOTHNESS = Unit(
     0.0,
     LONGEST_CANVAS,
     0.003,
-    _keep_smoothness,
+    _always_within(LEAST_SMOOTHNESS, LONGEST),
     Codec(_grown_between("smoothness"), "falloff", _root, _grown, grown),
     scaling=1,
     crowded=True,
+    # what is sharp stays so; what is not does not become so by chance, for no derivative would lead back
+    rests=True,
 )
 BACKGROUND = Unit(
     "background",
     0.0,
     1.0,
     0.01,
-    _keep_within(0.0, 1.0),
+    _always_within(0.0, 1.0),
     Codec(_between("color"), "color", stride=1),
     decimals=COLOR_DECIMALS,
 )

@@ -26,7 +26,7 @@ from ..render.tensors import Group
 from ..units import COLOR, FALLOFF, OPACITY, SMOOTHNESS, Placed
 from .initialization import start_of
 from .laying import Laid
-from .levenberg import Dense, Numbers, Problem, descend
+from .levenberg import Numbers, Problem
 from .surroundings import Surroundings
 
 ellipses_of: Callable[..., Any] = deferred("sdf2vec.fit.regions", "ellipses")  # scikit-image
@@ -293,7 +293,7 @@ class Proposer:
         ]
         rows, numbers = torch.cat(values, dim=1), self.numbers(structure, _is_geometry)
         for blur in BLURS:
-            rows, _ = descend(rows, _misses(structure, [mask], around, blur), numbers, steps, self.tick)
+            rows, _ = _misses(structure, [mask], around, blur).descended(rows, numbers, steps, self.tick)
         moved = zip(every, rows.split([slot.parameter.width for slot in every], dim=1), strict=True)
         outline = {slot: tensor for slot, tensor in moved if _is_geometry(slot)}
         return replace(layer, values={**layer.values, **outline})
@@ -328,7 +328,7 @@ class Proposer:
         numbers = self.numbers(structure, _is_geometry)
         rows = torch.cat(best)
         for blur in BLURS:
-            rows, errors = descend(rows, _misses(structure, spread, around, blur), numbers, STEPS, self.tick)
+            rows, errors = _misses(structure, spread, around, blur).descended(rows, numbers, STEPS, self.tick)
         return rows, errors, counts
 
     def placed(self, gain: torch.Tensor, around: Surroundings) -> Placed:
@@ -376,18 +376,9 @@ def _rows(structure: Structure, placed: Placed) -> torch.Tensor:
 
 
 def _misses(structure: Structure, masks: Sequence[Mask], around: Surroundings, blur: float) -> Problem:
-    """How far the coverage of each layer of one white shape is from its mask; of several shapes without kernels, for
-    there are too many structures to compile some for a look at each.
-    """
+    """How far the coverage of each layer of white shapes is from its mask."""
     strengths = torch.stack([mask.strength for mask in masks])[:, None]
     amounts = torch.stack([mask.amount for mask in masks])[:, None]
     x, y, pixel = around.points
     points, compositing = (x, y, pixel * blur), around.scene.compositing
-    if len(structure) > 2 or any(part.adds for part in structure[1:]):
-
-        def wrong(rows: torch.Tensor) -> torch.Tensor:
-            cover, _ = rows_coverage(structure, rows, compositing, *points)
-            return cover[:, None] * strengths - amounts
-
-        return Dense(wrong, len(x))
     return Laid(structure, compositing, points, torch.zeros(1, len(x)), strengths, amounts)

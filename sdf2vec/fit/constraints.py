@@ -3,20 +3,24 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
-from functools import cache
+from collections.abc import Callable, Sequence
+from functools import cache, lru_cache
+from itertools import accumulate
+from typing import NamedTuple
 
 import numpy as np
 import torch
 
-from ..arrays import Float64Array
+from ..arrays import Float32Array, Float64Array, IntArray
 from ..blend import COMPOSITING
 from ..graph import gradient, scalarize
+from ..layer import Structure, slots
 from ..lower.numpy import Arrays, compile_numpy
 from ..lower.torch import Tensors, compile_torch
 from ..render.tensors import Group, SceneTensors
 from ..shapes import KINDS
 from ..units import BACKGROUND, LENGTH, LONGEST, Room
+from .descent_kernels import hold_rows
 
 ALMOST = 0.999  # of the most that a number may be: there it still changes something
 NEWTON_STEPS = 6  # towards the least thickness, at most
@@ -35,7 +39,7 @@ def project(tensors: SceneTensors, pixel: float, falloff: tuple[float, float] = 
     tensors.background.clamp_(max=tensors.background[3].clone())  # premultiplied
 
 
-def room_of(tensors: SceneTensors, pixel: float, falloff: tuple[float, float]) -> Room:
+def room_of(tensors: SceneTensors, pixel: float, falloff: tuple[float, float] = (0.0, LONGEST)) -> Room:
     """What the ranges of a scene's numbers depend on."""
     return Room(tensors.size, pixel, falloff, COMPOSITING[tensors.compositing].signed)
 
@@ -67,6 +71,72 @@ def project_group(group: Group, room: Room) -> None:
     for index, part in enumerate(group.structure):
         for name, other in KINDS[part.kind].at_most:  # where it changes nothing, nothing would move it
             group.of(name, index).clamp_(max=ALMOST * group.of(other, index).amin(1, keepdim=True))
+
+
+class Ranges(NamedTuple):
+    """What the numbers of rows [G, U] may be: the same for a whole row at a time, which is in memory.
+
+    `low` and `high` [U]; `period` [U] of what is a remainder, else 0; whether a 0 may `rest` [U]. The number
+    `capped[k, 0]` is at most a share, `shares[k]`, of the least of those from `capped[k, 1]` to before `capped[k, 2]`.
+    """
+
+    low: Float32Array
+    high: Float32Array
+    period: Float32Array
+    rests: IntArray
+    capped: IntArray
+    shares: Float32Array
+
+    @classmethod
+    def joined(cls, parts: Sequence[Ranges]) -> Ranges:
+        """Those of rows one after the other in one."""
+        starts = accumulate((len(part.low) for part in parts), initial=0)
+        capped = [part.capped + start for part, start in zip(parts, starts, strict=False)]
+        low, high, period, rests, _, shares = map(np.concatenate, zip(*parts, strict=True))
+        return cls(low, high, period, rests, np.concatenate(capped), shares)
+
+    def hold(self, rows: torch.Tensor) -> None:
+        """Moves all numbers into their range, in place."""
+        hold_rows(rows.numpy(), *self)
+
+
+@lru_cache(1024)
+def ranges_of(structure: Structure, room: Room) -> Ranges:
+    """Those of layers of a structure."""
+    ends: list[tuple[float, float]] = []
+    period, rests = [], []
+    for slot in slots(structure):
+        unit, width = slot.parameter.unit, slot.parameter.width
+        within = unit.within(slot.parameter.positive, room)
+        ends += within * (width // len(within))
+        period += [unit.period] * width
+        rests += [unit.rests] * width
+    low, high = np.array(ends, np.float32).T.copy()
+    return Ranges(low, high, np.array(period, np.float32), np.array(rests, np.int64), *_caps(structure))
+
+
+def _caps(structure: Structure) -> tuple[IntArray, Float32Array]:
+    """Which numbers of a structure's rows are at most a share of the least of which others, and the shares."""
+    starts = accumulate((slot.parameter.width for slot in slots(structure)), initial=0)
+    columns = {
+        (slot.part, slot.parameter.name): (start, start + slot.parameter.width)
+        for slot, start in zip(slots(structure), starts, strict=False)
+    }
+    capped = [
+        (column, *columns[index, other])
+        for index, part in enumerate(structure)
+        for name, other in KINDS[part.kind].at_most  # where it changes nothing, nothing would move it
+        for column in range(*columns[index, name])
+    ]
+    return np.array(capped, np.int64).reshape(-1, 3), np.full(len(capped), ALMOST, np.float32)
+
+
+def ground_ranges(room: Room) -> Ranges:
+    """Those of a ground, premultiplied: no channel of it is more than its alpha."""
+    ((low, high),) = BACKGROUND.within(False, room)
+    capped = np.array([(channel, 3, 4) for channel in range(3)], np.int64)
+    least, most = np.full(4, low, np.float32), np.full(4, high, np.float32)
+    return Ranges(least, most, np.zeros(4, np.float32), np.zeros(4, np.int64), capped, np.ones(3, np.float32))
 
 
 @torch.no_grad()

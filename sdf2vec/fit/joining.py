@@ -21,9 +21,9 @@ from ..shapes import KINDS
 from ..units import FALLOFF, SMOOTHNESS
 from .adam import rate_of
 from .candidates import Opening, Proposer, Tried, alone, openings, reductions
-from .constraints import project_group, room_of
+from .constraints import ranges_of, room_of
 from .initialization import Layers, straight
-from .levenberg import Numbers, descend
+from .levenberg import Numbers
 from .surroundings import Surroundings, View, layer_at, points_of, some
 
 RESOLUTIONS = 40, 80  # pixels squared at which candidates are tried; at which the best are refined first
@@ -219,7 +219,7 @@ class Search:
         """A layer after so many steps of some of its numbers down the squared error."""
         structure = layer.structure
         numbers = self.numbers(around, structure, moves)
-        rows, errors = descend(layer.rows(), around.problem(structure), numbers, steps, self.tick)
+        rows, errors = around.problem(structure).descended(layer.rows(), numbers, steps, self.tick)
         return Tried(layer_of(structure, layer.order, rows), float(errors[0]))
 
     def _searched(self, layer: Group, around: Surroundings, worth: Worth, steps: int) -> Tried:
@@ -292,14 +292,10 @@ class Search:
 
     def numbers(self, around: Surroundings, structure: Structure, moves: Callable[[Slot], bool]) -> Numbers:
         """Which numbers of a structure's rows move, how far in one step, and what keeps them in their range."""
-        scene, bottom = around.scene, torch.zeros(1, dtype=torch.int64)
+        scene = around.scene
         every = [moves(slot) for slot in slots(structure) for _ in range(slot.parameter.width)]
         room = room_of(scene, self.least, self.falloff)
-        return Numbers.where(
-            every,
-            longest_steps(structure, scene),
-            lambda rows: project_group(layer_of(structure, bottom, rows), room),
-        )
+        return Numbers.where(every, longest_steps(structure, scene), ranges_of(structure, room))
 
 
 def longest_steps(structure: Structure, scene: SceneTensors) -> torch.Tensor:

@@ -19,8 +19,8 @@ from ..lower.llvm import assembled, forward
 from ..render.kernels import carried, drawn
 from ..render.tiling import PIXELS
 from ..threads import in_threads, threads
-from .levenberg import Equations
-from .normal_kernels import add_products, sum_squares
+from .descent_kernels import descend_rows, sum_squares
+from .levenberg import Descended, Numbers, Tick
 
 WORTH_A_THREAD = 10**6  # values of pixels, about half a millisecond; to wake one takes up to a fifth
 
@@ -63,41 +63,55 @@ class Laid:
     def errors(self, rows: torch.Tensor) -> Float64Array:
         """Mean squares [G] for rows [G, U]."""
         sums = np.zeros(len(rows))
-        self._run(sum_squares, 0, 1, rows, sums)
+        self._run(sum_squares, self._entries[:1], 1, 1, self._numbers(rows), sums)
         sums /= self.below.numel()
         return sums
 
-    def normal(self, rows: torch.Tensor, free: IntArray) -> Equations:
-        """The normal equations by the free numbers."""
-        count, width = rows.shape
-        normal, right = np.zeros((count, len(free), len(free))), np.zeros((count, len(free)))
-        self._run(add_products, 1, 2 + width, rows, free, normal, right)
-        normal += np.tril(normal, -1).transpose(0, 2, 1)
-        return normal, right
+    def descended(self, rows: torch.Tensor, numbers: Numbers, steps: int, tick: Tick) -> Descended:
+        """The rows after so many steps down these, each by itself, and what they are then; `tick` is told the least."""
+        made, sums = self._numbers(rows), np.zeros(len(rows))
+        count, free = threads(), len(numbers.free)
+        self._run(
+            descend_rows,
+            self._entries,
+            1 + made.shape[1],
+            steps,
+            made,
+            steps,
+            numbers.free,
+            numbers.longest,
+            *numbers.ranges,
+            np.empty((count, made.shape[1]), np.float32),
+            *np.empty((2, count, free, free)),
+            *np.empty((2, count, free)),
+            sums,
+        )
+        errors = torch.from_numpy(sums / self.below.numel()).to(rows.dtype)
+        tick(float(errors.min()))
+        return torch.from_numpy(made[:, 1:].copy()), errors
+
+    def _numbers(self, rows: torch.Tensor) -> Float32Array:
+        """Rows that begin with the size of a pixel, [G, 1 + U]."""
+        numbers = np.empty((len(rows), 1 + rows.shape[1]), np.float32)
+        numbers[:, 0], numbers[:, 1:] = self._pixel, rows.numpy()
+        return numbers
 
     def _run(
         self,
         kernel: Callable[..., object],
-        entry: int,
+        entries: Sequence[Entry],
         values: int,
-        rows: torch.Tensor,
-        *rest: Float64Array | IntArray,
+        times: int,
+        numbers: Float32Array,
+        *rest: object,
     ) -> None:
-        """Calls a kernel with scratch for so many values of each channel of a pixel."""
+        """Calls a kernel with scratch for so many values of each channel of a pixel, which goes over all so often."""
         channels, points = self.below.shape
-        count, width = rows.shape
-        numbers = np.empty((count, 1 + width), np.float32)
-        numbers[:, 0], numbers[:, 1:] = self._pixel, rows.numpy()
+        count = len(numbers)
         scratch = np.empty((threads(), channels * values, PIXELS), np.float32)
-        given = (
-            self._entries[entry].address,
-            numbers,
-            *self._blocks,
-            self._which(count),
-            *self._targets,
-            *rest,
-        )
-        most = 1 + count * channels * values * points // WORTH_A_THREAD
+        addresses = (entry.address for entry in entries)
+        given = (*addresses, numbers, *self._blocks, self._which(count), *self._targets, *rest)
+        most = 1 + count * channels * values * points * times // WORTH_A_THREAD
         in_threads(kernel, scratch, *given, most=most)
 
     def _which(self, count: int) -> IntArray:

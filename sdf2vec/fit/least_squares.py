@@ -9,7 +9,6 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import replace
-from functools import partial
 from itertools import accumulate
 
 import numpy as np
@@ -22,9 +21,9 @@ from ..render.reference import canvas_axes
 from ..render.tensors import SceneTensors
 from ..render.tiling import PIXELS, TILE
 from ..threads import in_threads, threads
-from ..units import BACKGROUND, COLOR
+from ..units import BACKGROUND, COLOR, Room
 from .adam import rate_of
-from .constraints import enforce_min_thickness, project
+from .constraints import Ranges, enforce_min_thickness, ground_ranges, ranges_of, room_of
 from .joining import LONGEST_STEP, Search, detached, layer_of, longest_steps
 from .laying import entries
 from .levenberg import Equations, Numbers, descend
@@ -42,8 +41,8 @@ def improved(
     if not scene.groups:
         return scene
     problem = SceneProblem(detached(scene), view)
-    keep = partial(project, pixel=search.least, falloff=search.falloff)
-    numbers = problem.numbers(keep, is_simple if simple else lambda slot, value: False)
+    room = room_of(scene, search.least, search.falloff)
+    numbers = problem.numbers(room, is_simple if simple else lambda slot, value: False)
     row, _ = descend(problem.row(), problem, numbers, steps, search.tick)
     made = detached(problem.scene_of(row))
     enforce_min_thickness(made, search.pixel)
@@ -94,19 +93,20 @@ class SceneProblem:
         ]
         return replace(self.scene, groups=groups, background=ground)
 
-    def numbers(self, keep: Callable[[SceneTensors], None], stays: Callable[[Slot, float], bool]) -> Numbers:
-        """Which move, how far in one step, and what keeps them in their range; the ground's where it is opaque."""
-        moves, steps = [], []
+    def numbers(self, room: Room, stays: Callable[[Slot, float], bool]) -> Numbers:
+        """Which move, how far in one step, and what all may be; the ground's move where it is opaque."""
+        moves, steps, ranges = [], [], []
         for group in self.scene.groups:
             slots = [slot for slot in group.values for _ in range(slot.parameter.width)]
             for row in group.rows().tolist():
                 moves += [not stays(slot, value) for slot, value in zip(slots, row, strict=True)]
             steps.append(longest_steps(group.structure, self.scene).repeat(len(group)))
+            ranges += [ranges_of(group.structure, room)] * len(group)
         grounds = min(self.channels, 3) if self.scene.opaque else 0
         moves += [True] * grounds
         side = math.sqrt(self.scene.size[0] * self.scene.size[1])
         steps.append(torch.full((grounds,), rate_of(BACKGROUND, side, LONGEST_STEP)))
-        return Numbers.where(moves, torch.cat(steps), lambda row: keep(self.scene_of(row)))
+        return Numbers.where(moves, torch.cat(steps), Ranges.joined([*ranges, ground_ranges(room)]))
 
     def errors(self, rows: torch.Tensor) -> Float64Array:
         """The mean square [1]."""

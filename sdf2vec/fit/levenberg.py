@@ -7,14 +7,19 @@ derivatives come from one pass backward in which every point has numbers of its 
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from typing import NamedTuple, Protocol
+from typing import TYPE_CHECKING, NamedTuple, Protocol
 
 import numpy as np
 import torch
 
 from ..arrays import Float64Array, IntArray
 
+if TYPE_CHECKING:
+    from .constraints import Ranges
+
 Equations = tuple[Float64Array, Float64Array]  # matrices [G, F, F], and right sides [G, F]
+Descended = tuple[torch.Tensor, torch.Tensor]  # rows [G, U], and their mean squares [G]
+Tick = Callable[[float], None]
 
 FIRST_DAMPING, LESS, MORE = 0.1, 0.3, 5.0  # of a step; after one that helps, after one that does not
 MOST_DAMPED, LEAST_DAMPED = 1e4, 1e-7
@@ -25,6 +30,16 @@ TINY = 1e-9
 
 class Problem(Protocol):
     """How wrong candidates are, from their rows [G, U]."""
+
+    def errors(self, rows: torch.Tensor) -> Float64Array:
+        """Mean squares [G]."""
+
+    def descended(self, rows: torch.Tensor, numbers: Numbers, steps: int, tick: Tick) -> Descended:
+        """The rows after so many steps down these; `tick` is told the least of them."""
+
+
+class Derived(Protocol):
+    """One that says how these depend on the numbers."""
 
     def errors(self, rows: torch.Tensor) -> Float64Array:
         """Mean squares [G]."""
@@ -42,6 +57,10 @@ class Dense(NamedTuple):
     def errors(self, rows: torch.Tensor) -> Float64Array:
         """Mean squares [G]."""
         return _array(self.wrong(rows[..., None]).square().mean(dim=(1, 2)))
+
+    def descended(self, rows: torch.Tensor, numbers: Numbers, steps: int, tick: Tick) -> Descended:
+        """The rows after so many steps down these; `tick` is told the least of them."""
+        return descend(rows, self, numbers, steps, tick)
 
     def normal(self, rows: torch.Tensor, free: IntArray) -> Equations:
         """The normal equations, by autograd."""
@@ -63,19 +82,17 @@ def _array(tensor: torch.Tensor) -> Float64Array:
 
 
 class Numbers(NamedTuple):
-    """Which numbers of a row move [F], how far each may in one step [F], and what keeps rows in their range."""
+    """Which numbers of a row move [F], how far each may in one step [F], and what all may be."""
 
     free: IntArray
     longest: Float64Array
-    project: Callable[[torch.Tensor], None]
+    ranges: Ranges
 
     @classmethod
-    def where(
-        cls, moves: Sequence[bool], longest: torch.Tensor, project: Callable[[torch.Tensor], None]
-    ) -> Numbers:
+    def where(cls, moves: Sequence[bool], longest: torch.Tensor, ranges: Ranges) -> Numbers:
         """Those that move, of all numbers of a row."""
         free = np.flatnonzero(moves).astype(np.int64)
-        return cls(free, _array(longest)[free], project)
+        return cls(free, _array(longest)[free], ranges)
 
     def without(self, fixed: torch.Tensor) -> Numbers:
         """Those but the ones that are fixed [U]."""
@@ -84,9 +101,7 @@ class Numbers(NamedTuple):
 
 
 @torch.no_grad()
-def descend(
-    rows: torch.Tensor, problem: Problem, numbers: Numbers, steps: int, tick: Callable[[float], None]
-) -> tuple[torch.Tensor, torch.Tensor]:
+def descend(rows: torch.Tensor, problem: Derived, numbers: Numbers, steps: int, tick: Tick) -> Descended:
     """Candidates [G, U] after so many steps down their mean squared residuals; and these, [G].
 
     A step that does not help is not made; it ends early where `PATIENCE` steps have hardly helped any candidate. `tick`
@@ -100,7 +115,7 @@ def descend(
         equations = equations or problem.normal(rows, numbers.free)
         step = _step(*equations, damping, numbers.longest)
         moved.numpy()[:, numbers.free] -= step.clip(-numbers.longest, numbers.longest)
-        numbers.project(moved)
+        numbers.ranges.hold(moved)
         found = problem.errors(moved)
         better = found < errors
         idle = 0 if (found < errors * (1.0 - HARDLY)).any() else idle + 1

@@ -23,7 +23,6 @@ from ..scene import Color
 from .candidates import Opening, alone, cut_from
 from .initialization import straight
 from .joining import Search, layer_of
-from .levenberg import descend
 from .surroundings import Surroundings
 
 label: Callable[..., Any] = deferred("skimage.measure", "label")
@@ -348,7 +347,7 @@ def _descended(
     numbers = search.numbers(around, structure, lambda slot: True)
     problem = around.problem(structure, torch.stack([region.counts for region in regions]))
     rows = torch.cat([layer.rows() for layer in layers])
-    rows, _ = descend(rows, problem, numbers, STEPS, search.tick)
+    rows, _ = problem.descended(rows, numbers, STEPS, search.tick)
     return _offers_of(rows, layers[0], regions, around)
 
 

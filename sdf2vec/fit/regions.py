@@ -53,13 +53,15 @@ def strokes(region: np.ndarray) -> list[np.ndarray]:
 
     They are what a line `SLENDER` times as long as the region is thick fits into, in one of four directions.
     """
-    padded = np.pad(region, 1)
-    reach = math.ceil(SLENDER * ndimage.distance_transform_edt(padded).max())
+    (box,) = ndimage.find_objects(region.astype(np.int8))
+    inside = region[box]
+    reach = math.ceil(SLENDER * ndimage.distance_transform_edt(np.pad(inside, 1)).max())
     found = []
     for line in _lines(reach):
         if max(line.shape) > max(region.shape):
             return []
-        labels = measure.label(ndimage.binary_opening(region, line))
+        labels = np.zeros(region.shape, np.int64)
+        labels[box] = measure.label(ndimage.binary_opening(inside, line))
         found += [labels == number for number in range(1, labels.max() + 1)]
     least = LEAST_STROKE * region.sum()
     found = [stroke for stroke in found if least < stroke.sum() < MOST_STROKE * region.sum()]

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping, Sequence
-from functools import cache, partial
+from functools import cache
 
 import torch
 
@@ -20,7 +20,7 @@ from ..scene import Scene
 from ..steps import Steps, StepsOf
 from ..threads import threads_of_its_own
 from .adam import Moving, adam_over
-from .constraints import least_length, project
+from .constraints import least_length, project, room_of
 from .joining import detached
 from .least_squares import SceneProblem, count_numbers, is_simple
 from .levenberg import descend as down
@@ -148,7 +148,7 @@ def _by_least_squares(
         for group in settling:
             group.settle(share)
         problem = SceneProblem(detached(tensors), view)
-        numbers = problem.numbers(partial(project, pixel=pixel), stays).without(_settled_in(settling))
+        numbers = problem.numbers(room_of(tensors, pixel), stays).without(_settled_in(settling))
         if len(numbers.free):
             row, _ = down(problem.row(), problem, numbers, EACH, lambda error: None)
             tensors.take(problem.scene_of(row))

@@ -60,11 +60,11 @@ def without_divisions(roots: Sequence[Expr], varying: Iterable[Expr]) -> list[Ex
     depends = dependent(roots, varying)
     done: dict[Expr, Expr] = {}
     for node in walk(roots):
-        args = [done[arg] for arg in node.args]
+        args = tuple([done[arg] for arg in node.args])
         if node.op == "div" and node in depends and node.args[1] not in depends:
             done[node] = args[0] * (1.0 / args[1])
         else:
-            done[node] = operation(node.op, *args) if node.args else node
+            done[node] = node if args == node.args else operation(node.op, *args)
     return [done[root] for root in roots]
 
 

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 import torch
 
+from sdf2vec.fit.constraints import project, room_of
 from sdf2vec.fit.initialization import Layers
 from sdf2vec.fit.joining import Search
 from sdf2vec.fit.least_squares import SceneProblem, improved, is_simple
@@ -60,6 +61,18 @@ def test_normal_equations_are_those_of_finite_differences(compositing, channels)
     assert normal[0] == pytest.approx((slopes.T @ slopes).numpy(), rel=2e-3, abs=1e-6 * scale)
     assert right[0] == pytest.approx((slopes.T @ wrong(here)).numpy(), rel=2e-3, abs=1e-5 * scale)
     assert float(problem.errors(row)[0]) == pytest.approx(float(wrong(here).square().mean()), rel=1e-5)
+
+
+def test_a_row_is_held_in_its_ranges_as_the_scene_is():
+    """By the projection that fits take; no channel of the ground is more than its alpha."""
+    problem = SceneProblem(scene_of(DISC, RING, DISC, RAMP), View(torch.rand(4, HEIGHT, WIDTH), None))
+    for seed in range(20):
+        row = torch.randn(problem.row().shape, generator=torch.Generator().manual_seed(seed))
+        wanted = problem.scene_of(row.clone())
+        project(wanted, 0.02, (0.001, 0.5))
+        problem.numbers(room_of(wanted, 0.02, (0.001, 0.5)), is_simple).ranges.hold(row)
+        held = SceneProblem(wanted, problem.view).row()
+        assert row.numpy() == pytest.approx(held.numpy(), abs=1e-6)
 
 
 def search(falloff=(0.0, 1.0)) -> Search:
