@@ -16,7 +16,6 @@ from ..arrays import Float64Array
 from ..blend import INTERSECTION, SUBTRACTION, UNION
 from ..layer import LOOK, Slot, row_width
 from ..paints import FLAT
-from ..render.reference import rows_coverage
 from ..render.tensors import Group
 from .arcs import Arc, arcs
 from .candidates import Mask, Opening, Proposer, own_cover
@@ -294,5 +293,4 @@ def cover_at(layers: Sequence[Group], around: Surroundings) -> torch.Tensor:
 
 def _covers(layers: Sequence[Group], around: Surroundings) -> torch.Tensor:
     """The same [G, P] of layers of one structure, each alone."""
-    rows, compositing = torch.cat([layer.rows() for layer in layers]), around.scene.compositing
-    return rows_coverage(layers[0].structure, rows[..., None], compositing, *around.points)[0]
+    return around.covers(layers[0].structure, torch.cat([layer.rows() for layer in layers]))

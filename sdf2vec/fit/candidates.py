@@ -21,7 +21,6 @@ from ..expr import const, var, vec3, vec4
 from ..layer import JOIN, LOOK, Part, Slot, Structure, slots
 from ..lower.torch import Tensors, compile_torch
 from ..paints import BASE, FLAT
-from ..render.reference import rows_coverage
 from ..render.tensors import Group
 from ..units import COLOR, FALLOFF, OPACITY, SMOOTHNESS, Placed
 from .initialization import start_of
@@ -200,9 +199,7 @@ def _mask(low: torch.Tensor, high: torch.Tensor) -> Mask:
 def own_cover(layer: Group, index: int, around: Surroundings) -> torch.Tensor:
     """Coverage [P] of one part of a layer alone."""
     own = single(layer, index, Part(layer.structure[index].kind))
-    rows = own.rows()[..., None]
-    cover, _ = rows_coverage(own.structure, rows, around.scene.compositing, *around.points)
-    return cover[0]
+    return around.covers(own.structure, own.rows())[0]
 
 
 def single(layer: Group, index: int, part: Part) -> Group:
@@ -379,6 +376,5 @@ def _misses(structure: Structure, masks: Sequence[Mask], around: Surroundings, b
     """How far the coverage of each layer of white shapes is from its mask."""
     strengths = torch.stack([mask.strength for mask in masks])[:, None]
     amounts = torch.stack([mask.amount for mask in masks])[:, None]
-    x, y, pixel = around.points
-    points, compositing = (x, y, pixel * blur), around.scene.compositing
-    return Laid(structure, compositing, points, torch.zeros(1, len(x)), strengths, amounts)
+    blocks, nothing = around.blocks.blurred(blur), torch.zeros(1, around.blocks.points)
+    return Laid(structure, around.scene.compositing, blocks, nothing, strengths, amounts)

@@ -121,6 +121,23 @@ def hold_rows(
 
 
 @kernel
+def lay_rows(
+    first: I64,
+    step: I64,
+    laid: F32[4],
+    function: I64,
+    rows: F32[2],
+    x: F32[2],
+    y: F32[2],
+    below: F32[3],
+):
+    """What every step-th candidate makes of what is below it, [G, B, C, pixels]."""
+    for g in range(first, rows.shape[0], step):
+        for block in range(x.shape[0]):
+            call(function, (rows[g], 0, PIXELS, x[block], y[block], below[block], laid[g, block]))
+
+
+@kernel
 def sum_squares(
     first: I64,
     step: I64,

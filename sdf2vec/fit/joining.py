@@ -160,7 +160,7 @@ class Worth:
         """The best few that don't look alike; of those that do, the one of fewest numbers."""
         found: list[tuple[Tried, torch.Tensor]] = []
         for tried in self.best(all_tried):
-            wrong = around.wrong(tried.layer)
+            wrong = around.wrong(tried.layer.structure, tried.layer.rows())
             near = ALIKE * max(tried.error, self.least)
             like = [i for i, (_, other) in enumerate(found) if (wrong - other).square().mean() <= near]
             if not like:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import cache, cached_property
+from typing import NamedTuple
 
 import numpy as np
 import torch
@@ -13,15 +14,17 @@ from torch.nn.functional import pad
 from ..arrays import Float32Array, Float64Array, IntArray
 from ..graph import gradient
 from ..kernel_cache import Assembly, Entry
-from ..layer import Formula, Structure
+from ..layer import Formula, Structure, slots
 from ..lower.block import Block
 from ..lower.llvm import assembled, forward
 from ..render.kernels import carried, drawn
 from ..render.tiling import PIXELS
 from ..threads import in_threads, threads
-from .descent_kernels import descend_rows, sum_squares
+from ..units import COLOR, OPACITY
+from .descent_kernels import descend_rows, lay_rows, sum_squares
 from .levenberg import Descended, Numbers, Tick
 
+Points = tuple[torch.Tensor, torch.Tensor, torch.Tensor]  # x [P], y [P], the size of a pixel []
 WORTH_A_THREAD = 10**6  # values of pixels, about half a millisecond; to wake one takes up to a fifth
 
 
@@ -46,30 +49,81 @@ def _text(block: Block, channels: int) -> str:
     return forward(block, {"x": 1, "y": 1, "below": channels, "found": len(block.outputs)}, PIXELS)
 
 
+class Blocks(NamedTuple):
+    """Points in blocks: x, y [B, pixels], the last filled up with 0; how many there are; the size of a pixel."""
+
+    x: Float32Array
+    y: Float32Array
+    points: int
+    pixel: float
+
+    @classmethod
+    def of(cls, points: Points) -> Blocks:
+        """Those of x [P], y [P] and the size of a pixel []."""
+        x, y, pixel = points
+        return cls(_blocked(x), _blocked(y), len(x), float(pixel))
+
+    def blurred(self, blur: float) -> Blocks:
+        """The same with pixels so many times as large."""
+        return self._replace(pixel=self.pixel * blur)
+
+    def numbers(self, rows: torch.Tensor) -> Float32Array:
+        """Rows [G, U] that begin with the size of a pixel, [G, 1 + U]."""
+        numbers = np.empty((len(rows), 1 + rows.shape[1]), np.float32)
+        numbers[:, 0], numbers[:, 1:] = self.pixel, rows.numpy()
+        return numbers
+
+    def laid(self, entry: Entry, rows: torch.Tensor, below: Float32Array) -> torch.Tensor:
+        """What layers with rows [G, U] make of what is below them [B, C, pixels], [G, C, P]."""
+        made = np.empty((len(rows), *below.shape), np.float32)
+        most = 1 + made.size // WORTH_A_THREAD
+        in_threads(lay_rows, made, entry.address, self.numbers(rows), self.x, self.y, below, most=most)
+        return torch.from_numpy(made).transpose(1, 2).flatten(2)[..., : self.points]
+
+
+def covers(structure: Structure, compositing: str, rows: torch.Tensor, blocks: Blocks) -> torch.Tensor:
+    """Coverage [G, P] of layers with rows [G, U]: what is seen where they are white and opaque, on black."""
+    white = rows.clone()
+    white[:, _looks(structure)] = 1.0
+    black = np.zeros((len(blocks.x), 1, PIXELS), np.float32)
+    return blocks.laid(entries(structure, compositing, 1)[0], white, black)[:, 0]
+
+
+@cache
+def _looks(structure: Structure) -> list[int]:
+    """Which numbers of a row are colours or opacities."""
+    units = (slot.parameter.unit for slot in slots(structure) for _ in range(slot.parameter.width))
+    return [index for index, unit in enumerate(units) if unit in (COLOR, OPACITY)]
+
+
 @dataclass(frozen=True)
 class Laid:
     """Candidates for a layer on what is below it: what is wrong is `scale` · laid − `offset`.
 
-    The points: x [P], y [P], the size of a pixel []. `scale` and `offset` may be those of each candidate, or of all.
+    `scale` and `offset` may be those of each candidate, or of all.
     """
 
     structure: Structure
     compositing: str
-    points: tuple[torch.Tensor, torch.Tensor, torch.Tensor]
+    blocks: Blocks
     below: torch.Tensor  # [C, P]
     scale: torch.Tensor  # [G or 1, C, P]
     offset: torch.Tensor  # [G or 1, C, P]
 
+    def residuals(self, rows: torch.Tensor) -> torch.Tensor:
+        """What is wrong, [G, C, P], with rows [G, U]."""
+        return self.scale * self.blocks.laid(self._entries[0], rows, self._below) - self.offset
+
     def errors(self, rows: torch.Tensor) -> Float64Array:
         """Mean squares [G] for rows [G, U]."""
         sums = np.zeros(len(rows))
-        self._run(sum_squares, self._entries[:1], 1, 1, self._numbers(rows), sums)
+        self._run(sum_squares, self._entries[:1], 1, 1, self.blocks.numbers(rows), sums)
         sums /= self.below.numel()
         return sums
 
     def descended(self, rows: torch.Tensor, numbers: Numbers, steps: int, tick: Tick) -> Descended:
         """The rows after so many steps down these, each by itself, and what they are then; `tick` is told the least."""
-        made, sums = self._numbers(rows), np.zeros(len(rows))
+        made, sums = self.blocks.numbers(rows), np.zeros(len(rows))
         count, free = threads(), len(numbers.free)
         self._run(
             descend_rows,
@@ -90,12 +144,6 @@ class Laid:
         tick(float(errors.min()))
         return torch.from_numpy(made[:, 1:].copy()), errors
 
-    def _numbers(self, rows: torch.Tensor) -> Float32Array:
-        """Rows that begin with the size of a pixel, [G, 1 + U]."""
-        numbers = np.empty((len(rows), 1 + rows.shape[1]), np.float32)
-        numbers[:, 0], numbers[:, 1:] = self._pixel, rows.numpy()
-        return numbers
-
     def _run(
         self,
         kernel: Callable[..., object],
@@ -110,7 +158,8 @@ class Laid:
         count = len(numbers)
         scratch = np.empty((threads(), channels * values, PIXELS), np.float32)
         addresses = (entry.address for entry in entries)
-        given = (*addresses, numbers, *self._blocks, self._which(count), *self._targets, *rest)
+        x, y, *_ = self.blocks
+        given = (*addresses, numbers, x, y, self._below, self._which(count), *self._targets, *rest)
         most = 1 + count * channels * values * points * times // WORTH_A_THREAD
         in_threads(kernel, scratch, *given, most=most)
 
@@ -123,14 +172,9 @@ class Laid:
         return entries(self.structure, self.compositing, self.below.shape[0])
 
     @cached_property
-    def _pixel(self) -> float:
-        return float(self.points[2])
-
-    @cached_property
-    def _blocks(self) -> Sequence[Float32Array]:
-        """x, y [B, pixels] and what is below [B, C, pixels]."""
-        x, y, _ = self.points
-        return _blocked(x), _blocked(y), np.ascontiguousarray(_blocked(self.below).swapaxes(0, 1))
+    def _below(self) -> Float32Array:
+        """What is below, [B, C, pixels]."""
+        return np.ascontiguousarray(_blocked(self.below).swapaxes(0, 1))
 
     @cached_property
     def _targets(self) -> Sequence[Float32Array]:

@@ -31,6 +31,9 @@ TINY = 1e-9
 class Problem(Protocol):
     """How wrong candidates are, from their rows [G, U]."""
 
+    def residuals(self, rows: torch.Tensor) -> torch.Tensor:
+        """What is wrong, [G, C, P]."""
+
     def errors(self, rows: torch.Tensor) -> Float64Array:
         """Mean squares [G]."""
 
@@ -54,9 +57,13 @@ class Dense(NamedTuple):
     wrong: Callable[[torch.Tensor], torch.Tensor]
     points: int
 
+    def residuals(self, rows: torch.Tensor) -> torch.Tensor:
+        """What is wrong, [G, C, P]."""
+        return self.wrong(rows[..., None])
+
     def errors(self, rows: torch.Tensor) -> Float64Array:
         """Mean squares [G]."""
-        return _array(self.wrong(rows[..., None]).square().mean(dim=(1, 2)))
+        return _array(self.residuals(rows).square().mean(dim=(1, 2)))
 
     def descended(self, rows: torch.Tensor, numbers: Numbers, steps: int, tick: Tick) -> Descended:
         """The rows after so many steps down these; `tick` is told the least of them."""

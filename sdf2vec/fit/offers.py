@@ -269,8 +269,7 @@ def _offers_of(
     """What layers with these rows [N, U] gain; None for those that cover nothing of their region."""
     structure = like.structure
     before = around.residual.square().mean(0).flatten()
-    covers, wrong = around.laid(structure, rows)
-    after = wrong.square().mean(1)
+    covers, after = around.covers(structure, rows), around.wrong(structure, rows).square().mean(1)
     parts = torch.tensor([region.under(cover) for region, cover in zip(regions, covers, strict=True)])
     inside = torch.stack([region.labels for region in regions]) == parts[:, None]
     potential, gain = (before * inside).mean(1), (before - after).mean(1)

@@ -11,7 +11,8 @@ from ..paints import FLAT, PAINTS
 from ..render import fused
 from ..render.tensors import Group, SceneTensors
 from .joining import Search, inserted
-from .surroundings import Points, Surroundings, View, layer_at, points_of
+from .laying import Points
+from .surroundings import Surroundings, View, layer_at, points_of
 
 PAINT, KIND = "linear", "box"
 ROUNDS = 8  # of a plane through the pixels that are nearest to it

@@ -53,26 +53,45 @@ def strokes(region: np.ndarray) -> list[np.ndarray]:
 
     They are what a line `SLENDER` times as long as the region is thick fits into, in one of four directions.
     """
-    (box,) = ndimage.find_objects(region.astype(np.int8))
-    inside = region[box]
-    reach = math.ceil(SLENDER * ndimage.distance_transform_edt(np.pad(inside, 1)).max())
+    reach = math.ceil(SLENDER * ndimage.distance_transform_edt(np.pad(region, 1)).max())
+    size = 2 * reach + 1
+    if size > max(region.shape):
+        return []
     found = []
-    for line in _lines(reach):
-        if max(line.shape) > max(region.shape):
-            return []
-        labels = np.zeros(region.shape, np.int64)
-        labels[box] = measure.label(ndimage.binary_opening(inside, line))
+    for opened in _openings(region, size):
+        labels = measure.label(opened)
         found += [labels == number for number in range(1, labels.max() + 1)]
     least = LEAST_STROKE * region.sum()
     found = [stroke for stroke in found if least < stroke.sum() < MOST_STROKE * region.sum()]
     return sorted(found, key=lambda stroke: -stroke.sum())[:MOST_STROKES]
 
 
-def _lines(reach: int) -> list[np.ndarray]:
-    """Masks of lines through a middle that go so many pixels to both sides."""
-    size = 2 * reach + 1
-    diagonal = np.eye(size, dtype=bool)
-    return [np.ones((1, size), bool), np.ones((size, 1), bool), diagonal, diagonal[::-1]]
+def _openings(region: np.ndarray, size: int) -> Iterator[np.ndarray]:
+    """Where lines of so many pixels fit into a region: level, upright, falling and rising ones."""
+    yield _opened(region.T, size).T
+    yield _opened(region, size)
+    width = region.shape[1]
+    yield _straight(_opened(_skewed(region[:, ::-1]), size), width)[:, ::-1]
+    yield _straight(_opened(_skewed(region), size), width)
+
+
+def _opened(region: np.ndarray, size: int) -> np.ndarray:
+    """Where upright lines fit into a region."""
+    eroded = ndimage.minimum_filter1d(region, size, axis=0, mode="constant")
+    opened: np.ndarray = ndimage.maximum_filter1d(eroded, size, axis=0, mode="constant")
+    return opened
+
+
+def _skewed(region: np.ndarray) -> np.ndarray:
+    """Each row moved to the right by its number: what rises in [H, W] is upright in [H, W + H − 1]."""
+    height, width = region.shape
+    return np.pad(region, ((0, 0), (0, height))).ravel()[:-height].reshape(height, width + height - 1)
+
+
+def _straight(skewed: np.ndarray, width: int) -> np.ndarray:
+    """The rows moved back."""
+    height = len(skewed)
+    return np.pad(skewed.ravel(), (0, height)).reshape(height, -1)[:, :width]
 
 
 def _ellipse(region: np.ndarray) -> Ellipse:

@@ -15,15 +15,13 @@ from ..layer import ROW_OPACITY, Structure
 from ..render import fused
 from ..render.reference import canvas, lay, rows_coverage
 from ..render.tensors import Group, SceneTensors
-from .laying import Laid
+from .laying import Blocks, Laid, Points, covers
 from .levenberg import Dense, Problem
 
 # shapes in a layer, and points: there are too many structures of more shapes to compile kernels for a look at less
 MOST_COMPILED, GLANCE = 6, 2500
 
 SEEN = 0.2  # of what is below, at least, where its colour is told from what is shown
-
-Points = tuple[torch.Tensor, torch.Tensor, torch.Tensor]  # x [P], y [P], size of a pixel []
 
 
 class View(NamedTuple):
@@ -144,25 +142,30 @@ class Surroundings:
         each point counts for each of them.
         """
         if len(structure) > MOST_COMPILED and len(self.weights) < GLANCE:
-            weights = 1.0 if counts is None else counts[:, None]
-            return Dense(lambda rows: self._laid_at(structure, rows)[1] * weights, len(self.weights))
+            matter = 1.0 if counts is None else counts[:, None]
+            return Dense(lambda rows: self._wrong_at(structure, rows) * matter, len(self.weights))
         weights = self.weights[None] if counts is None else self.weights * counts
         scale = (self.light - self.dark) * weights[:, None]
         offset = (self.target.flatten(1) - self.dark) * weights[:, None]
-        return Laid(structure, self.scene.compositing, self.points, self.below, scale, offset)
+        return Laid(structure, self.scene.compositing, self.blocks, self.below, scale, offset)
 
-    def wrong(self, layers: Group) -> torch.Tensor:
-        """What is wrong with each of some layers in the place of this one, weighted, [G, C, P]."""
-        return self.laid(layers.structure, layers.rows())[1]
+    @cached_property
+    def blocks(self) -> Blocks:
+        """The points as kernels take them."""
+        return Blocks.of(self.points)
 
-    def laid(self, structure: Structure, rows: torch.Tensor) -> tuple[torch.Tensor, torch.Tensor]:
-        """Coverage [G, P] of layers with these rows [G, U] in the place of this one, and what is wrong with each."""
-        return self._laid_at(structure, rows[..., None])
+    def covers(self, structure: Structure, rows: torch.Tensor) -> torch.Tensor:
+        """Coverage [G, P] of layers of a structure with these rows [G, U]."""
+        return covers(structure, self.scene.compositing, rows, self.blocks)
 
-    def _laid_at(self, structure: Structure, rows: torch.Tensor) -> tuple[torch.Tensor, torch.Tensor]:
-        """The same from rows [G, U, P or 1]."""
+    def wrong(self, structure: Structure, rows: torch.Tensor) -> torch.Tensor:
+        """What is wrong with layers of these rows [G, U] in the place of this one, weighted, [G, C, P]."""
+        return self.problem(structure).residuals(rows)
+
+    def _wrong_at(self, structure: Structure, rows: torch.Tensor) -> torch.Tensor:
+        """The same from rows [G, U, P or 1], without kernels."""
         cover, color = rows_coverage(structure, rows, self.scene.compositing, *self.points)
-        return cover, self.wrong_with(cover, color, rows[:, ROW_OPACITY - 1])
+        return self.wrong_with(cover, color, rows[:, ROW_OPACITY - 1])
 
     def wrong_with(self, cover: torch.Tensor, color: torch.Tensor, opacity: torch.Tensor) -> torch.Tensor:
         """What is wrong with layers, weighted, [G, C, P], from coverage [G, P], colours [G, 3, P or 1] and opacities

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -16,6 +17,7 @@ from sdf2vec.fit.levenberg import Dense, Numbers, descend
 from sdf2vec.fit.regions import ellipses, strokes
 from sdf2vec.fit.surroundings import GLANCE, MOST_COMPILED, Surroundings, View
 from sdf2vec.layer import Part, row_width, slots
+from sdf2vec.render.reference import rows_coverage
 from sdf2vec.render.tensors import from_scene
 from sdf2vec.scene import Layer, Scene, Shape
 from sdf2vec.units import ANGLE, SMOOTHNESS, Room
@@ -160,6 +162,21 @@ def test_each_candidate_goes_in_kernels_where_it_goes_alone_by_autograd(
         wanted, error = alone.descended(rows[index : index + 1], numbers, steps, lambda error: None)
         assert float(errors[index]) == pytest.approx(float(error), rel=1e-4)
         assert found[index].numpy() == pytest.approx(wanted[0].numpy(), abs=1e-3)
+
+
+@pytest.mark.parametrize("compositing", ["over", "additive"])
+@pytest.mark.parametrize(
+    "structure",
+    [*STRUCTURES, (Part("box", "linear"), Part("arc", "linear", "union")), (Part("gabor", "linear"),)],
+    ids=lambda parts: "-".join(part.kind for part in parts),
+)
+def test_coverage_is_that_of_the_reference_whatever_the_look(structure, compositing):
+    scene = replace(in_the_middle(3).scene, compositing=compositing)
+    around = Surroundings.of(scene, 1, View(torch.zeros(3, 50, 61), None))
+    rows, _ = some_of(structure)
+    wanted, _ = rows_coverage(structure, rows[..., None], compositing, *around.points)
+    assert around.covers(structure, rows).numpy() == pytest.approx(wanted.numpy(), abs=1e-5)
+    assert wanted.max() - wanted.min() > 0.5
 
 
 def test_a_candidate_that_is_hardly_helped_any_more_stays():

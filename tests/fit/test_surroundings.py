@@ -26,7 +26,9 @@ def test_a_layer_in_its_own_place_is_as_wrong_as_the_scene(compositing, channels
     view = View(target, weights)
     wrong = (composite(scene, WIDTH, HEIGHT)[:channels] - target) * weights
     around, layer = Surroundings.of(scene, order, view), layer_at(scene, order)
-    assert around.wrong(layer)[0].numpy() == pytest.approx(wrong.flatten(1).numpy(), abs=2e-5)
+    assert around.wrong(layer.structure, layer.rows())[0].numpy() == pytest.approx(
+        wrong.flatten(1).numpy(), abs=2e-5
+    )
     assert around.error(layer) == pytest.approx(float(wrong.square().mean()), rel=1e-4)
 
 
