@@ -13,8 +13,10 @@ from dataclasses import dataclass, replace
 from functools import cache
 from typing import Any, NamedTuple
 
+import numpy as np
 import torch
 
+from ..arrays import IntArray
 from ..blend import JOINS, SHARPEST, SUBTRACTION
 from ..deferred import deferred
 from ..expr import const, var, vec3, vec4
@@ -25,7 +27,7 @@ from ..render.tensors import Group
 from ..units import COLOR, FALLOFF, OPACITY, SMOOTHNESS, Placed
 from .initialization import start_of
 from .laying import Laid
-from .levenberg import Numbers, Problem
+from .levenberg import Numbers
 from .surroundings import Surroundings
 
 ellipses_of: Callable[..., Any] = deferred("sdf2vec.fit.regions", "ellipses")  # scikit-image
@@ -289,8 +291,9 @@ class Proposer:
             for slot in every
         ]
         rows, numbers = torch.cat(values, dim=1), self.numbers(structure, _is_geometry)
+        misses = _misses(structure, [mask], around)
         for blur in BLURS:
-            rows, _ = _misses(structure, [mask], around, blur).descended(rows, numbers, steps, self.tick)
+            rows, _ = misses.blurred(blur).descended(rows, numbers, steps, self.tick)
         moved = zip(every, rows.split([slot.parameter.width for slot in every], dim=1), strict=True)
         outline = {slot: tensor for slot, tensor in moved if _is_geometry(slot)}
         return replace(layer, values={**layer.values, **outline})
@@ -309,24 +312,22 @@ class Proposer:
         self,
         kind: str,
         masks: Sequence[Mask],
-        starts: Sequence[Placed],
+        placed: Sequence[Placed],
         around: Surroundings,
         kept: int,
     ) -> tuple[torch.Tensor, torch.Tensor, list[int]]:
         """Rows [N, U] of layers of one shape, their squared errors [N], and how many belong to each mask."""
         structure = (Part(kind),)
-        best = []
-        for mask, placed in zip(masks, starts, strict=True):
-            fresh = _rows(structure, placed)
-            missed = _misses(structure, [mask], around, BLURS[0]).errors(fresh)
-            best.append(fresh[_distinct(torch.from_numpy(missed))[:kept]])
-        counts = [len(rows) for rows in best]
-        spread = [mask for mask, count in zip(masks, counts, strict=True) for _ in range(count)]
+        misses = _misses(structure, masks, around)
+        fresh = [_rows(structure, each) for each in placed]
+        missed = misses.of_each(_whose(fresh)).blurred(BLURS[0]).errors(torch.cat(fresh))
+        errors = torch.from_numpy(missed).split([len(rows) for rows in fresh])
+        best = [rows[_distinct(own)[:kept]] for rows, own in zip(fresh, errors, strict=True)]
+        misses, rows = misses.of_each(_whose(best)), torch.cat(best)
         numbers = self.numbers(structure, _is_geometry)
-        rows = torch.cat(best)
         for blur in BLURS:
-            rows, errors = _misses(structure, spread, around, blur).descended(rows, numbers, STEPS, self.tick)
-        return rows, errors, counts
+            rows, found = misses.blurred(blur).descended(rows, numbers, STEPS, self.tick)
+        return rows, found, [len(own) for own in best]
 
     def placed(self, gain: torch.Tensor, around: Surroundings) -> Placed:
         """Where shapes start: along each region of what is wanted [P], the other way round, and turned at random."""
@@ -372,9 +373,14 @@ def _rows(structure: Structure, placed: Placed) -> torch.Tensor:
     return torch.cat([start_of(slot.parameter, placed, looks) for slot in slots(structure)], dim=1)
 
 
-def _misses(structure: Structure, masks: Sequence[Mask], around: Surroundings, blur: float) -> Problem:
-    """How far the coverage of each layer of white shapes is from its mask."""
+def _whose(rows: Sequence[torch.Tensor]) -> IntArray:
+    """For each row of several [N, U] the number of those that it is one of."""
+    return np.repeat(np.arange(len(rows), dtype=np.int64), [len(own) for own in rows])
+
+
+def _misses(structure: Structure, masks: Sequence[Mask], around: Surroundings) -> Laid:
+    """How far the coverage of layers of white shapes is from each mask."""
     strengths = torch.stack([mask.strength for mask in masks])[:, None]
     amounts = torch.stack([mask.amount for mask in masks])[:, None]
-    blocks, nothing = around.blocks.blurred(blur), torch.zeros(1, around.blocks.points)
-    return Laid(structure, around.scene.compositing, blocks, nothing, strengths, amounts)
+    nothing = torch.zeros(1, around.blocks.points)
+    return Laid.of(structure, around.scene.compositing, around.blocks, nothing, strengths, amounts)

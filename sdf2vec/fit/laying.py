@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from functools import cache, cached_property
+from functools import cache
 from typing import NamedTuple
 
 import numpy as np
@@ -73,12 +73,16 @@ class Blocks(NamedTuple):
         numbers[:, 0], numbers[:, 1:] = self.pixel, rows.numpy()
         return numbers
 
-    def laid(self, entry: Entry, rows: torch.Tensor, below: Float32Array) -> torch.Tensor:
-        """What layers with rows [G, U] make of what is below them [B, C, pixels], [G, C, P]."""
+    def laid(self, entry: Entry, rows: torch.Tensor, below: Float32Array) -> Float32Array:
+        """What layers with rows [G, U] make of what is below them [B, C, pixels], [G, B, C, pixels]."""
         made = np.empty((len(rows), *below.shape), np.float32)
         most = 1 + made.size // WORTH_A_THREAD
         in_threads(lay_rows, made, entry.address, self.numbers(rows), self.x, self.y, below, most=most)
-        return torch.from_numpy(made).transpose(1, 2).flatten(2)[..., : self.points]
+        return made
+
+    def flat(self, values: Float32Array) -> torch.Tensor:
+        """Values in blocks [G, B, C, pixels] as those of points, [G, C, P]."""
+        return torch.from_numpy(values).transpose(1, 2).flatten(2)[..., : self.points]
 
 
 def covers(structure: Structure, compositing: str, rows: torch.Tensor, blocks: Blocks) -> torch.Tensor:
@@ -86,7 +90,7 @@ def covers(structure: Structure, compositing: str, rows: torch.Tensor, blocks: B
     white = rows.clone()
     white[:, _looks(structure)] = 1.0
     black = np.zeros((len(blocks.x), 1, PIXELS), np.float32)
-    return blocks.laid(entries(structure, compositing, 1)[0], white, black)[:, 0]
+    return blocks.flat(blocks.laid(entries(structure, compositing, 1)[0], white, black))[:, 0]
 
 
 @cache
@@ -98,28 +102,52 @@ def _looks(structure: Structure) -> list[int]:
 
 @dataclass(frozen=True)
 class Laid:
-    """Candidates for a layer on what is below it: what is wrong is `scale` · laid − `offset`.
+    """Candidates for a layer on what is below it [B, C, pixels]: what is wrong is `scale` · laid − `offset`.
 
-    `scale` and `offset` may be those of each candidate, or of all.
+    `scale` and `offset` [M, B, C, pixels] are each candidate's own, or the same for all, or as `which` [G] tells.
     """
 
     structure: Structure
     compositing: str
     blocks: Blocks
-    below: torch.Tensor  # [C, P]
-    scale: torch.Tensor  # [G or 1, C, P]
-    offset: torch.Tensor  # [G or 1, C, P]
+    below: Float32Array
+    scale: Float32Array
+    offset: Float32Array
+    which: IntArray | None = None
+
+    @classmethod
+    def of(
+        cls,
+        structure: Structure,
+        compositing: str,
+        blocks: Blocks,
+        below: torch.Tensor,
+        scale: torch.Tensor,
+        offset: torch.Tensor,
+    ) -> Laid:
+        """From what is below [C, P], scale and offset [M, C, P]."""
+        planes = [np.ascontiguousarray(_blocked(each).swapaxes(-3, -2)) for each in (below, scale, offset)]
+        return cls(structure, compositing, blocks, planes[0], planes[1], planes[2])
+
+    def of_each(self, which: IntArray) -> Laid:
+        """The same for candidates, each with the scale and offset of that number."""
+        return replace(self, which=which)
+
+    def blurred(self, blur: float) -> Laid:
+        """The same with pixels so many times as large."""
+        return replace(self, blocks=self.blocks.blurred(blur))
 
     def residuals(self, rows: torch.Tensor) -> torch.Tensor:
         """What is wrong, [G, C, P], with rows [G, U]."""
-        return self.scale * self.blocks.laid(self._entries[0], rows, self._below) - self.offset
+        which = self._which(len(rows))
+        laid = self.blocks.laid(self._entries[0], rows, self.below)
+        return self.blocks.flat(self.scale[which] * laid - self.offset[which])
 
     def errors(self, rows: torch.Tensor) -> Float64Array:
         """Mean squares [G] for rows [G, U]."""
         sums = np.zeros(len(rows))
         self._run(sum_squares, self._entries[:1], 1, 1, self.blocks.numbers(rows), sums)
-        sums /= self.below.numel()
-        return sums
+        return sums / self._values
 
     def descended(self, rows: torch.Tensor, numbers: Numbers, steps: int, tick: Tick) -> Descended:
         """The rows after so many steps down these, each by itself, and what they are then; `tick` is told the least."""
@@ -140,7 +168,7 @@ class Laid:
             *np.empty((2, count, free)),
             sums,
         )
-        errors = torch.from_numpy(sums / self.below.numel()).to(rows.dtype)
+        errors = torch.from_numpy(sums / self._values).to(rows.dtype)
         tick(float(errors.min()))
         return torch.from_numpy(made[:, 1:].copy()), errors
 
@@ -154,33 +182,33 @@ class Laid:
         *rest: object,
     ) -> None:
         """Calls a kernel with scratch for so many values of each channel of a pixel, which goes over all so often."""
-        channels, points = self.below.shape
-        count = len(numbers)
+        channels, count = self._channels, len(numbers)
         scratch = np.empty((threads(), channels * values, PIXELS), np.float32)
         addresses = (entry.address for entry in entries)
         x, y, *_ = self.blocks
-        given = (*addresses, numbers, x, y, self._below, self._which(count), *self._targets, *rest)
-        most = 1 + count * channels * values * points * times // WORTH_A_THREAD
+        given = (*addresses, numbers, x, y, self.below, self._which(count), self.scale, self.offset, *rest)
+        most = 1 + count * self._values * values * times // WORTH_A_THREAD
         in_threads(kernel, scratch, *given, most=most)
 
     def _which(self, count: int) -> IntArray:
         """Which scale and offset each candidate has."""
-        return np.arange(count, dtype=np.int64) if self.scale.shape[0] > 1 else np.zeros(count, np.int64)
+        if self.which is not None:
+            return self.which
+        return np.arange(count, dtype=np.int64) if len(self.scale) > 1 else np.zeros(count, np.int64)
 
-    @cached_property
+    @property
+    def _values(self) -> int:
+        """How many are wrong or right."""
+        return self.blocks.points * self._channels
+
+    @property
+    def _channels(self) -> int:
+        channels: int = self.below.shape[1]
+        return channels
+
+    @property
     def _entries(self) -> tuple[Entry, Entry]:
-        return entries(self.structure, self.compositing, self.below.shape[0])
-
-    @cached_property
-    def _below(self) -> Float32Array:
-        """What is below, [B, C, pixels]."""
-        return np.ascontiguousarray(_blocked(self.below).swapaxes(0, 1))
-
-    @cached_property
-    def _targets(self) -> Sequence[Float32Array]:
-        """Scale and offset, [M, B, C, pixels]."""
-        both = (_blocked(each) for each in (self.scale, self.offset))
-        return tuple(np.ascontiguousarray(each.swapaxes(1, 2)) for each in both)
+        return entries(self.structure, self.compositing, self._channels)
 
 
 def _blocked(tensor: torch.Tensor) -> Float32Array:

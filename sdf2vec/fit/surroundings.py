@@ -147,7 +147,7 @@ class Surroundings:
         weights = self.weights[None] if counts is None else self.weights * counts
         scale = (self.light - self.dark) * weights[:, None]
         offset = (self.target.flatten(1) - self.dark) * weights[:, None]
-        return Laid(structure, self.scene.compositing, self.blocks, self.below, scale, offset)
+        return Laid.of(structure, self.scene.compositing, self.blocks, self.below, scale, offset)
 
     @cached_property
     def blocks(self) -> Blocks:
