@@ -11,13 +11,14 @@ from collections import defaultdict
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
+from itertools import groupby
 from typing import Any
 
 import torch
-from torch.nn.functional import max_pool2d
+from torch.nn.functional import max_pool2d, one_hot
 
 from ..deferred import deferred
-from ..layer import row_width
+from ..layer import Structure, row_width
 from ..render.tensors import Group
 from ..scene import Color
 from .candidates import Opening, alone, cut_from
@@ -101,11 +102,17 @@ class Region:
             opening = replace(self.opening, mask=self.opening.mask.only(counts))
             yield Region(opening, self.wanted * own, self.labels * own, counts)
 
-    def under(self, cover: torch.Tensor) -> int:
-        """The number of the part that a shape [P] covers most of; 0 where it covers none."""
-        inside = torch.bincount(self.labels, weights=cover)
-        inside[0] = 0.0
-        return int(inside.argmax()) if inside.max() > 0 else 0
+    def under(self, covers: torch.Tensor) -> torch.Tensor:
+        """The number [N] of the part that each of some shapes [N, P] covers most of; 0 where it covers none."""
+        inside = covers @ self._parts
+        return torch.where(inside.amax(1) > 0, inside.argmax(1), 0)
+
+    @cached_property
+    def _parts(self) -> torch.Tensor:
+        """1 where a point is in a part, [P, parts + 1]; nothing is in the first, which is none."""
+        parts = one_hot(self.labels.long()).float()
+        parts[:, 0] = 0.0
+        return parts
 
 
 @dataclass(frozen=True)
@@ -116,7 +123,8 @@ class Offer:
     that it is for; `stays`: the share of that which does not; `harm`: what becomes worse elsewhere, in the same shares.
     """
 
-    layer: Group
+    structure: Structure
+    row: torch.Tensor  # [1, U]
     region: Region
     part: int  # of the region
     cover: torch.Tensor  # [P]
@@ -124,6 +132,11 @@ class Offer:
     potential: float
     stays: float
     harm: float
+
+    @cached_property
+    def layer(self) -> Group:
+        """The layer."""
+        return layer_of(self.structure, self.region.opening.layer.order, self.row)
 
     @property
     def left(self) -> float:
@@ -149,7 +162,7 @@ class Offer:
     @property
     def kind(self) -> str:
         """Of its shape."""
-        return self.layer.structure[0].kind
+        return self.structure[0].kind
 
     @property
     def is_within(self) -> bool:
@@ -159,17 +172,17 @@ class Offer:
     @property
     def by_number(self) -> float:
         """Its gain by the numbers that it takes."""
-        return self.gain / row_width(self.layer.structure)
+        return self.gain / row_width(self.structure)
 
     @property
     def is_joined(self) -> bool:
         """Whether its layer has several shapes."""
-        return len(self.layer.structure) > 1
+        return len(self.structure) > 1
 
     @property
     def order(self) -> int:
         """Its place in the draw order."""
-        return int(self.layer.order)
+        return int(self.region.opening.layer.order)
 
 
 def offers(around: Mapping[int, Surroundings], search: Search, floor: float) -> list[Offer]:
@@ -238,7 +251,7 @@ def _best(tries: Sequence[Offer], floor: float) -> Offer:
 
     def score(offer: Offer) -> float:
         left = max(offer.left * offer.potential, 0.1 * floor)
-        return math.log(left) + PRICE * row_width(offer.layer.structure)
+        return math.log(left) + PRICE * row_width(offer.structure)
 
     return min(tries, key=score)
 
@@ -259,25 +272,28 @@ def _searched(
         ends = proposer.optima(kind, openings, starts, around, STARTS)
         if ends:
             rows = torch.cat([layer.rows() for _, layer in ends])
-            made = _offers_of(rows, ends[0][1], [regions[index] for index, _ in ends], around)
+            made = _offers_of(ends[0][1].structure, rows, [regions[index] for index, _ in ends], around)
             yield from (offer for offer in made if offer is not None)
 
 
 def _offers_of(
-    rows: torch.Tensor, like: Group, regions: Sequence[Region], around: Surroundings
+    structure: Structure, rows: torch.Tensor, regions: Sequence[Region], around: Surroundings
 ) -> list[Offer | None]:
-    """What layers with these rows [N, U] gain; None for those that cover nothing of their region."""
-    structure = like.structure
+    """What layers with these rows [N, U] gain; None for those that cover nothing of their region, of which equal ones
+    are one after the other.
+    """
     before = around.residual.square().mean(0).flatten()
     covers, after = around.covers(structure, rows), around.wrong(structure, rows).square().mean(1)
-    parts = torch.tensor([region.under(cover) for region, cover in zip(regions, covers, strict=True)])
-    inside = torch.stack([region.labels for region in regions]) == parts[:, None]
+    runs = [list(run) for _, run in groupby(range(len(regions)), key=lambda index: id(regions[index]))]
+    found = [regions[run[0]].under(covers[run[0] : run[-1] + 1]) for run in runs]
+    inside = torch.cat([regions[run[0]].labels == own[:, None] for run, own in zip(runs, found, strict=True)])
     potential, gain = (before * inside).mean(1), (before - after).mean(1)
     stays, harm = (after * inside).mean(1), ((after - before).clamp_min(0.0) * ~inside).mean(1)
     shares = torch.stack([stays, harm]) / potential.clamp_min(1e-12)
+    parts = torch.cat(found)
     numbers = zip(*(each.tolist() for each in (parts, gain, potential, *shares)), strict=True)
     return [
-        Offer(layer_of(structure, like.order, row[None]), region, part, cover, *rest) if part else None
+        Offer(structure, row[None], region, part, cover, *rest) if part else None
         for row, region, cover, (part, *rest) in zip(rows, regions, covers, numbers, strict=True)
     ]
 
@@ -347,7 +363,7 @@ def _descended(
     problem = around.problem(structure, torch.stack([region.counts for region in regions]))
     rows = torch.cat([layer.rows() for layer in layers])
     rows, _ = problem.descended(rows, numbers, STEPS, search.tick)
-    return _offers_of(rows, layers[0], regions, around)
+    return _offers_of(structure, rows, regions, around)
 
 
 def _apart(ranked: Sequence[Offer]) -> list[Offer]:
