@@ -372,9 +372,6 @@ OPERATIONS: dict[str, Operation] = {
 }
 
 
-CONSTANT = {"const"}
-
-
 def expression_of(value: Operand) -> Expr:
     """A number as a constant."""
     return value if isinstance(value, Expr) else const(value)
@@ -383,10 +380,10 @@ def expression_of(value: Operand) -> Expr:
 def operation(op: str, *args: Operand) -> Expr:
     """The node of a table row, folded where that is trivial. Raises TypeError when the types do not fit."""
     row = OPERATIONS[op]
-    given = tuple([arg if isinstance(arg, Expr) else const(arg) for arg in args])
+    given = tuple(expression_of(arg) for arg in args)
     given = scalars_of(given) if op.startswith("vec") else given
     type = row.result([arg.type for arg in given])
-    if row.value and type is FLOAT and {arg.op for arg in given} == CONSTANT:
+    if row.value and type is FLOAT and all(arg.op == "const" for arg in given):
         return const(row.value(*(constant(arg) for arg in given)))
     simple = SIMPLER[op](*given) if op in SIMPLER else None
     return simple if simple is not None and simple.type is type else node(op, given, type)

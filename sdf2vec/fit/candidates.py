@@ -27,7 +27,7 @@ from ..render.tensors import Group
 from ..units import COLOR, FALLOFF, OPACITY, SMOOTHNESS, Placed
 from .initialization import start_of
 from .laying import Laid
-from .levenberg import Numbers
+from .levenberg import Numbers, Tick
 from .surroundings import Surroundings
 
 ellipses_of: Callable[..., Any] = deferred("sdf2vec.fit.regions", "ellipses")  # scikit-image
@@ -240,7 +240,7 @@ class Proposer:
     paint: str
     generator: torch.Generator
     numbers: Callable[[Structure, Callable[[Slot], bool]], Numbers]
-    tick: Callable[[float], None]
+    tick: Tick
 
     def without(self, kind: str) -> Proposer:
         """The same for all other kinds, if there are any."""

@@ -23,7 +23,7 @@ from .adam import rate_of
 from .candidates import Opening, Proposer, Tried, alone, openings, reductions
 from .constraints import ranges_of, room_of
 from .initialization import Layers, straight
-from .levenberg import Numbers
+from .levenberg import Numbers, Tick
 from .surroundings import Surroundings, View, layer_at, points_of, some
 
 RESOLUTIONS = 40, 80  # pixels squared at which candidates are tried; at which the best are refined first
@@ -44,8 +44,6 @@ FIRST_PRICE = 0.004  # while others may follow
 LEAST_GAIN = 0.03  # of the worth of the best layer: with less the search ends
 LEAST_ERROR = 1e-9  # mean square: of a picture that needs no layer
 LEAST_SHARE = 2e-4  # of what is missing without the layer, squared: below it nothing is missing
-
-Tick = Callable[[float], None]  # told of the error after every step; raises to stop
 
 
 @torch.no_grad()

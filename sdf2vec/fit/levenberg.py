@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 
 Equations = tuple[Float64Array, Float64Array]  # matrices [G, F, F], and right sides [G, F]
 Descended = tuple[torch.Tensor, torch.Tensor]  # rows [G, U], and their mean squares [G]
-Tick = Callable[[float], None]
+Tick = Callable[[float], None]  # told of the error after steps; raises to stop
 
 FIRST_DAMPING, LESS, MORE = 0.1, 0.3, 5.0  # of a step; after one that helps, after one that does not
 MOST_DAMPED, LEAST_DAMPED = 1e4, 1e-7
