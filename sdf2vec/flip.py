@@ -235,7 +235,7 @@ def _compiled(outputs: tuple[Expr, ...], inputs: tuple[Expr, ...]) -> Callable[.
 # --- filters ------------------------------------------------------------------------------------------------
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Filters:
     """All of FLIP's filters, each one across and one down; what lies outside repeats the edge.
 

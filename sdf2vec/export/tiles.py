@@ -65,7 +65,7 @@ class Grid:
         return np.stack([low, high])
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Tiles:
     """`entries[starts[t]:starts[t + 1]]` are the layers of cell t (row by row), in draw order."""
 
@@ -79,7 +79,7 @@ class Tiles:
         return len(self.entries) / self.grid.cells
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Bounds:
     """Of every layer, in draw order: a box that holds its coverage, and within which distances it is 0 and 1."""
 

@@ -21,7 +21,7 @@ BETAS = (0.9, 0.9)
 EPSILON = 1e-12
 
 
-@dataclass
+@dataclass(eq=False)
 class Moving:
     """A tensor that is trained, and what Adam remembers of it: running means of the derivative and its square."""
 

@@ -38,7 +38,7 @@ NEAR = 2  # pixels around what is looked at
 TINY = 1e-9
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Outlined:
     """A layer of one shape, or of several that are joined, for an overlay; of strokes `more` layers with it.
 
@@ -107,7 +107,7 @@ class Outlined:
         return bool((self.overlay.inside & other.overlay.outside).any())
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Area:
     """Where an overlay is, [P], and where it is known whether it is, [P], in a window of some surroundings."""
 

@@ -70,7 +70,7 @@ class Mask(NamedTuple):
         return self.only(torch.where(self.gain > 0, 1.0, EAGER))
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Opening:
     """A place for one more shape: its number among the parts, its join, its colour [1, 3], what it should cover."""
 

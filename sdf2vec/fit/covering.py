@@ -46,7 +46,7 @@ class Bar(NamedTuple):
     gain: int
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Covering:
     """A region of a colour [1, 3]: where it is, [P], where that is known, [P], and the looks of its layer, which has no
     shape.

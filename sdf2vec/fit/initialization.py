@@ -54,7 +54,7 @@ class Layers:
         return COMPOSITING[self.compositing].signed
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Places:
     """Where and how large layers start: centres [N, 2] and sizes [N] in scene units, straight RGBA [N, 4]."""
 

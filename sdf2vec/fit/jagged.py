@@ -50,7 +50,7 @@ def _reached(pixels: Float32Array) -> tuple[Float32Array, Float32Array]:
     return share, color
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class _Runs:
     """Straight stretches of edges below rows of pixels; where the edge goes on a pixel higher before or after one, how
     many of its pixels lie on the slope to there, else 0.

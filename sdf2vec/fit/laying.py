@@ -100,7 +100,7 @@ def _looks(structure: Structure) -> list[int]:
     return [index for index, unit in enumerate(units) if unit in (COLOR, OPACITY)]
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Laid:
     """Candidates for a layer on what is below it [B, C, pixels]: what is wrong is `scale` · laid − `offset`.
 

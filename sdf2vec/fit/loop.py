@@ -86,7 +86,7 @@ def fit_picture(
     return fit.scene()
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Stage:
     """A phase with what it needs at its resolution: the target, how much each pixel matters, the loss."""
 

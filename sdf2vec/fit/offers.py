@@ -60,7 +60,7 @@ WORTH, HOPELESS = 0.05, 1.5  # least share of all that is missing, most that is 
 Place = tuple[int, Color, int]
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Region:
     """What a shape may be for: an opening, where its colour is wanted, and which part of that a point is in.
 
@@ -115,7 +115,7 @@ class Region:
         return parts
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Offer:
     """A layer of one shape for a place in the draw order, and what it does.
 

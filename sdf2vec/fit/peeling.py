@@ -62,7 +62,7 @@ def peeled(scene: SceneTensors, views: Sequence[View], search: Search) -> SceneT
     return topped(scene, reversed(found))
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Outlines:
     """What the outlines of overlays were found to be; the surroundings rise in size.
 

@@ -27,7 +27,7 @@ NEAR = 5  # pixels across, in which another region is near
 BESIDE = 2  # pixels of a common edge that make neighbours
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Regions:
     """Regions by number from 1, 0 for none, [H, W], and where that is sure; the colour [R, C] of each, and how far that
     may be off [R].

@@ -62,7 +62,7 @@ class Shade(NamedTuple):
         return found
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Shading:
     """The regions of premultiplied pixels, by number from 1, 0 for none [H, W], where these are scaled down; and what
     they are painted with.

@@ -25,7 +25,7 @@ from .surroundings import Surroundings, View, error_of
 PATIENCE, CLOSE = 2, 10**-3.9  # rounds; mean squared error, 39 dB, below which there is none for a second
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Round:
     """What a round has come to: the scene, its mean squared error, and that before."""
 

@@ -79,7 +79,7 @@ def _taken(group: Group, rows: torch.Tensor) -> Group:
     return group.each(lambda tensor: tensor.index_select(0, rows))
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Surroundings:
     """All that one layer is seen with, at the points of a small canvas.
 

@@ -92,7 +92,7 @@ def uniform_rows(group: Group, pixel: float) -> torch.Tensor:
     return torch.cat([torch.full_like(group.opacity, pixel), *group.values.values()], dim=1)
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class _Canvas:
     """What a render needs besides the numbers of the scene."""
 
@@ -116,7 +116,7 @@ class _Canvas:
         return len(self.y) // TILE
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Bins:
     """Which layers touch each tile: those of tile t are layers[starts[t]:starts[t + 1]], in draw order."""
 

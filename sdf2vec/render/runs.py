@@ -21,7 +21,7 @@ FINENESS = 1.5  # samples in a standard deviation, at least, where they are wide
 ALPHA = 3  # place of alpha among the channels
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Runs:
     """How many layers each run has, in the draw order, and its blur's standard deviation [R] in scene units."""
 

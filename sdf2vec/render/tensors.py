@@ -17,7 +17,7 @@ from ..shapes import KINDS
 from ..units import COLOR
 
 
-@dataclass
+@dataclass(eq=False)
 class Group:
     """G layers of one structure: a tensor [G, width] for each slot of their rows."""
 
@@ -71,7 +71,7 @@ class Group:
         return Group(self.structure, torch.cat([self.order, other.order]), values)
 
 
-@dataclass
+@dataclass(eq=False)
 class SceneTensors:
     """A whole scene; `size` is the canvas in scene units, `background` premultiplied RGBA."""
 

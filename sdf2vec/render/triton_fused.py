@@ -28,7 +28,7 @@ SCRATCH = 1 << 29  # bytes
 WARPS = 4  # of 32 threads, for the 256 pixels of a tile; with fewer, unions run out of registers
 
 
-@dataclass
+@dataclass(eq=False)
 class Room:
     """For how many pairs of a tile and a layer a render takes memory, so that it need not wait for the GPU to know; the
     render sets `needed` [], how many there are: where they are more, it is wrong. Without `pairs` it waits.
@@ -55,7 +55,7 @@ def composite(
     return image
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class _Canvas:
     """What a render needs besides the numbers of the scene. Layers are group by group, not in draw order."""
 
@@ -112,7 +112,7 @@ def _axes(
 # --- which layers touch each tile ---------------------------------------------------------------------------
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class _Bins:
     """Pairs of a tile and a layer that covers some of it, sorted by tile, then draw order; all int32.
 

@@ -123,7 +123,7 @@ def nearest(tried: Sequence[Blurred]) -> Blurred:
     return best._replace(difference=best.difference.coarse())
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Trial:
     """A layer's coverage on a grid, to compare blurs with; only what lies on the canvas counts."""
 

@@ -92,7 +92,7 @@ def refitted(
     return Refitted(best.painted(scene), best.error(wanted))
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Stack:
     """Layers on a small canvas: coverage [N, P] as drawn, colours [N, 3, P or 1], opacities [N]; on a ground.
 
