@@ -88,6 +88,8 @@ class Outlines:
         for whole in (True, False):
             if all(each.bitten for each in found):
                 found += self._good(opaque(regions, self.scene.background.numpy(), whole), regions)
+        if not found:
+            found = self._good(holes(regions, self.scene.background.numpy()), regions)
         return _apart(sorted(found, key=lambda each: each.rank), regions)
 
     @property
@@ -240,6 +242,17 @@ def opaque(regions: Regions, ground: np.ndarray, whole: bool) -> Iterator[Overla
             inside = _linked(number, alike[number], regions) if whole else np.arange(count) == number
             done |= inside
             yield Overlay(1.0, colors[number], inside, ~inside)
+
+
+def holes(regions: Regions, ground: np.ndarray) -> Iterator[Overlay]:
+    """The regions of the ground's colour within others, as what may lie on top of these in that colour."""
+    is_ground, labels = _of_color(regions, ground), regions.labels
+    at_edge = np.concatenate([labels[0], labels[-1], labels[:, 0], labels[:, -1]])
+    inner = ~np.isin(np.arange(1, len(is_ground) + 1), at_edge)
+    within = is_ground & inner & regions.beside[:, ~is_ground].any(axis=1)
+    for number in np.flatnonzero(within):
+        inside = np.arange(len(within)) == number
+        yield Overlay(1.0, regions.colors[number], inside, ~inside)
 
 
 def _of_color(regions: Regions, color: np.ndarray) -> BoolArray:

@@ -160,6 +160,25 @@ def test_a_ring_is_one_layer_and_what_bites_into_a_disc_is_another():
     ]
 
 
+def test_what_has_many_holes_is_whole_and_each_hole_is_a_shape_in_the_ground_s_colour():
+    bars = (box(20, 60, 30, 75), box(42, 40, 52, 75), box(64, 20, 74, 75))
+    layers = apart(painted((box(10, 10, 86, 86), BLUE, 1.0), *((bar, WHITE, 1.0) for bar in bars)))
+    below, *holes = layers
+    assert [layer.seen[0].color for layer in layers] == [pytest.approx(c, abs=0.01) for c in (BLUE, *[WHITE] * 3)]
+    assert all([shape.kind for shape in layer.shapes] == ["box"] for layer in layers)
+    assert below.shapes[0].named()["half_size"] == pytest.approx((38 / 96,) * 2, abs=0.003)
+    across = sorted(layer.shapes[0].named()["center"][0] for layer in holes)
+    assert across == pytest.approx([(x - 48) / 96 for x in (25, 47, 69)], abs=0.003)
+
+
+def test_what_reaches_the_edge_of_the_picture_is_no_hole():
+    masks = (box(0, 30, 96, 60), box(40, 0, 50, 96), box(60, 40, 70, 50))
+    pixels = painted(*((mask, color, 1.0) for mask, color in zip(masks, (BLUE, RED, WHITE), strict=True)))
+    (hole,) = peeling.holes(regions := Regions.of(pixels), WHITE)
+    assert regions.areas[hole.inside] == pytest.approx([100], rel=0.01)
+    assert [*peeling.holes(regions.hidden(~hole.inside), WHITE)] == []  # of what is gone there is none
+
+
 def test_what_no_few_shapes_have_the_outline_of_is_left():
     x, y = points()
     flower = np.hypot(x - 48, y - 48) < 30 + 6 * np.sin(9 * np.arctan2(y - 48, x - 48))
