@@ -125,8 +125,8 @@ def in_the_middle(channels: int) -> Surroundings:
     draw = torch.Generator().manual_seed(3)
     below = Layer((Shape("circle", (-0.1, 0.0, 0.3), (0.9, 0.2, 0.1)),), 0.1, 0.8)
     above = Layer((Shape("circle", (0.2, 0.1, 0.25), (0.1, 0.5, 0.7)),), 0.05, 0.6)
-    scene = from_scene(Scene(61, 50, (below, below, above), (0.4, 0.5, 0.6)))
-    view = View(torch.rand(channels, 50, 61, generator=draw), torch.rand(50, 61, generator=draw))
+    scene = from_scene(Scene(31, 25, (below, below, above), (0.4, 0.5, 0.6)))
+    view = View(torch.rand(channels, 25, 31, generator=draw), torch.rand(25, 31, generator=draw))
     return Surroundings.of(scene, 1, view)
 
 
@@ -150,7 +150,7 @@ def test_each_candidate_goes_in_kernels_where_it_goes_alone_by_autograd(
 ):
     around = in_the_middle(channels)
     rows, numbers = some_of(structure)
-    counts = torch.rand(5, 50 * 61, generator=torch.Generator().manual_seed(7)) if counted else None
+    counts = torch.rand(5, 25 * 31, generator=torch.Generator().manual_seed(7)) if counted else None
     kernels = around.problem(structure, counts)
     assert isinstance(kernels, Laid)
     found, errors = kernels.descended(rows, numbers, steps, lambda error: None)
@@ -172,7 +172,7 @@ def test_each_candidate_goes_in_kernels_where_it_goes_alone_by_autograd(
 )
 def test_coverage_is_that_of_the_reference_whatever_the_look(structure, compositing):
     scene = replace(in_the_middle(3).scene, compositing=compositing)
-    around = Surroundings.of(scene, 1, View(torch.zeros(3, 50, 61), None))
+    around = Surroundings.of(scene, 1, View(torch.zeros(3, 25, 31), None))
     rows, _ = some_of(structure)
     wanted, _ = rows_coverage(structure, rows[..., None], compositing, *around.points)
     assert around.covers(structure, rows).numpy() == pytest.approx(wanted.numpy(), abs=1e-5)

@@ -16,7 +16,7 @@ from sdf2vec.render.tensors import from_scene
 from sdf2vec.render.triton_fused import composite
 from tests.triton_device import DEVICE, MARKS
 
-WIDTH, HEIGHT = 80, 64
+WIDTH, HEIGHT = 48, 32
 pytestmark = MARKS
 
 
