@@ -40,6 +40,8 @@ ARGUMENTS = (
     "--ignore-gpu-blocklist",
     "--enable-unsafe-webgpu",
     "--use-webgpu-adapter=swiftshader",
+    "--disable-gpu-vsync",
+    "--disable-frame-rate-limit",  # without a display there may be one frame a second
     "--disable-gpu-rasterization",  # drawings are rasterized on the CPU, the same everywhere
 )
 
