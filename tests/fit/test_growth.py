@@ -45,25 +45,25 @@ def drawn(scene: Scene, channels: int) -> torch.Tensor:
 
 @pytest.mark.parametrize(
     ("compositing", "transparent", "weighted"),
-    [("over", False, True), ("over", True, False), ("additive", False, False), ("additive", True, True)],
+    [("over", False, True), ("additive", True, False)],
 )
 def test_importance_is_what_the_image_loses(monkeypatch, compositing, transparent, weighted):
     """Against leaving each layer out; the probes' spread is that of a mean of squares, at most √(2/probes)."""
     monkeypatch.setattr(growth, "PROBES", 500)
-    kinds, look = ("circle", "box", "gabor"), {"compositing": compositing, "transparent": transparent}
-    scene = random_scene(kinds, width=18, height=12, layers=7, seed=3, joins=("union",), **look)
+    kinds, look = ("circle", "gabor"), {"compositing": compositing, "transparent": transparent}
+    scene = random_scene(kinds, width=18, height=12, layers=5, seed=3, joins=("union",), **look)
     channels = 4 if transparent else 3
     full = drawn(scene, channels)
     weights = torch.linspace(0.0, 1.0, 18).expand(12, 18) if weighted else None
     changes = [
-        (full - drawn(without(scene, i), channels)) * (1 if weights is None else weights) for i in range(7)
+        (full - drawn(without(scene, i), channels)) * (1 if weights is None else weights) for i in range(5)
     ]
     expected = torch.tensor([float(change.square().sum()) for change in changes])
     tensors = from_scene(scene)
     adam_over(tensors)
     image = composite(tensors, 18, 12)[:channels]
     scores = importance(image, tensors, seeded(), weights)
-    estimate = torch.empty(7)
+    estimate = torch.empty(5)
     for group, score in zip(tensors.groups, scores, strict=True):
         estimate[group.order] = score / 500
     assert (estimate - expected).abs().max() <= 5 * math.sqrt(2 / 500) * expected.max()
@@ -444,8 +444,8 @@ def test_what_is_known_of_old_layers_stays_and_rates_are_of_the_new_number():
 
 def test_more_shapes_are_never_worse():
     """Six pixels a circle: relocation once hid what was there below wide circles, and 1024 came out 7 dB worse."""
-    pixels = resize(load("examples/coffee.png").pixels, 96, 64)
+    pixels = resize(load("examples/coffee.png").pixels, 68, 45)
     few, many = (
-        error(fitted(Picture(pixels), count, preset="balanced"), Picture(pixels)) for count in (512, 1024)
+        error(fitted(Picture(pixels), count, preset="balanced"), Picture(pixels)) for count in (256, 512)
     )
     assert many < 0.5 * few
