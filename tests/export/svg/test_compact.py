@@ -2,6 +2,7 @@
 
 import gzip
 import random
+from dataclasses import replace
 from typing import Any
 from xml.etree import ElementTree
 
@@ -13,6 +14,7 @@ from sdf2vec.engines import ENGINES
 from sdf2vec.export.exported import MARK
 from sdf2vec.export.options import Options
 from sdf2vec.export.svg import small_svg
+from sdf2vec.fit import settling
 from sdf2vec.fit.drawable import rounded
 from sdf2vec.grain import GRAINS
 from tests.export.svg.drawings import BLACK, NAMESPACE, ORANGE, made, rendered, text_of, triangle
@@ -50,21 +52,22 @@ def test_the_smallest_drawing_says_a_triangle_in_few_bytes():
 
 @pytest.mark.usefixtures("drawn_once")
 @pytest.mark.parametrize("softest", [0.0, 0.15])
-def test_a_tighter_limit_takes_no_more_from_the_picture_than_it_must(softest, require_engine):
+def test_a_tighter_limit_takes_no_more_from_the_picture_than_it_must(softest, require_engine, monkeypatch):
     """From drawing to drawing, each a byte too large for the next limit: smaller and less near, by few dB a step."""
     require_engine("resvg")
+    monkeypatch.setattr(settling, "PHASES", [replace(phase, steps=40) for phase in settling.PHASES])
     r = random.Random(9)
     layers = tuple(
         Layer((random_shape(("triangle", "ellipse", "box")[i % 3], r),), r.uniform(0.2, 1.0) * softest, 0.8)
         for i in range(12)
     )
-    scene = Scene(240, 180, layers, (0.5, 0.5, 0.5))
-    wanted = rendered(scene, 480, 360)
+    scene = Scene(160, 120, layers, (0.5, 0.5, 0.5))
+    wanted = rendered(scene, 320, 240)
     texts = [text_of(scene)]
     while (last := made(scene, max_bytes=len(texts[-1].encode()) - 1)).met:
         texts.append(str(last.data))
     assert last.data == texts[-1]
-    found = [-10 * np.log10(np.mean((ENGINES["resvg"].render(t, 480, 360) - wanted) ** 2)) for t in texts]
+    found = [-10 * np.log10(np.mean((ENGINES["resvg"].render(t, 320, 240) - wanted) ** 2)) for t in texts]
     steps = -np.diff(found)
     assert len(steps) >= 5
     assert steps[1:].min() > -1.0, found
