@@ -208,11 +208,11 @@ def signature(name):
     return "i32" if name in NUMBERS else "*i32" if name in POINTERS else "*i64" if name in LONG else "*fp32"
 
 
-structures = (
-    (Part("gabor"),),
-    (Part("box", "linear"), Part("triangle", join="subtraction"), Part("displaced", join="union")),
+cases = (
+    ("over", 4, ((Part("gabor"),), (Part("triangle"), Part("displaced", join="union")))),
+    ("additive", 3, ((Part("box", "linear"), Part("triangle", join="subtraction")),)),
 )
-for compositing, channels in (("over", 4), ("additive", 3)):
+for compositing, channels, structures in cases:
     module = triton_kernels.load(structures, compositing, channels)
     for name in ("measure_layers", "find_pairs", "forward_tiles", "backward_tiles", "reduce_pairs"):
         kernel = getattr(module, name)
