@@ -14,7 +14,7 @@ import numpy as np
 import torch
 from scipy import ndimage
 
-from ..arrays import BoolArray
+from ..arrays import BoolArray, Float64Array
 from ..blend import INTERSECTION
 from ..render.tensors import Group, SceneTensors
 from .areas import Area, Outlined, cover_at
@@ -51,6 +51,9 @@ def peeled(scene: SceneTensors, views: Sequence[View], search: Search) -> SceneT
         return scene
     outlines = Outlines(scene, [Surroundings.of(scene, 0, view) for view in views], search)
     finest = outlines.around[-1]
+    if plate := outlines.plate(regions):
+        scene = replace(scene, background=_opaque_color(regions.colors[plate.overlay.outside][0]))
+        regions = regions.hidden(plate.overlay.outside)
     found, parts = hairlines(regions, finest, search.kinds)
     regions = regions.hidden(parts)
     while len(found) < MOST and not outlines.are_hopeless and (top := outlines.topmost(regions)):
@@ -59,7 +62,7 @@ def peeled(scene: SceneTensors, views: Sequence[View], search: Search) -> SceneT
             regions = regions.hidden(np.any([each.overlay.inside for each in top], axis=0))
         else:
             regions = bared(regions, top[0].overlay)
-    return topped(scene, reversed(found))
+    return topped(scene, [*(plate.layers if plate else ()), *reversed(found)])
 
 
 @dataclass(frozen=True, eq=False)
@@ -91,6 +94,16 @@ class Outlines:
         if not found:
             found = self._good(holes(regions, self.scene.background.numpy()), regions)
         return _apart(sorted(found, key=lambda each: each.rank), regions)
+
+    def plate(self, regions: Regions) -> Outlined | None:
+        """What lies under all else in the ground's colour, and leaves nothing of the picture but its four corners, in
+        another one: if it is a shape, that one is the ground.
+        """
+        corners, ground = cornered(regions), self.scene.background.numpy()[: regions.colors.shape[1]]
+        if not corners.any() or _of_color(regions, ground)[corners].any():
+            return None
+        told = self._told(Overlay(1.0, ground, ~corners, corners), regions)
+        return told if told is not None and told.is_plain and not told.soft else None
 
     @property
     def are_hopeless(self) -> bool:
@@ -244,6 +257,15 @@ def opaque(regions: Regions, ground: np.ndarray, whole: bool) -> Iterator[Overla
             yield Overlay(1.0, colors[number], inside, ~inside)
 
 
+def cornered(regions: Regions) -> BoolArray:
+    """Which regions [R] are in the corners of the picture; none where these are not all of one colour."""
+    labels, chosen = regions.labels, np.zeros(len(regions.colors), bool)
+    numbers = labels[[0, 0, -1, -1], [0, -1, 0, -1]]
+    if numbers.all() and _of_color(regions, regions.colors[numbers[0] - 1])[numbers - 1].all():
+        chosen[numbers - 1] = True
+    return chosen
+
+
 def holes(regions: Regions, ground: np.ndarray) -> Iterator[Overlay]:
     """The regions of the ground's colour within others, as what may lie on top of these in that colour."""
     is_ground, labels = _of_color(regions, ground), regions.labels
@@ -259,6 +281,11 @@ def _of_color(regions: Regions, color: np.ndarray) -> BoolArray:
     """Which regions [R] have about a colour [C]."""
     apart = np.abs(regions.colors - color[: regions.colors.shape[1]])
     return np.asarray((apart <= 2 * regions.doubts[:, None]).all(axis=1))
+
+
+def _opaque_color(color: Float64Array) -> torch.Tensor:
+    """A colour [C] as RGBA."""
+    return torch.from_numpy(np.concatenate([color, np.ones(4 - len(color))])).float()
 
 
 def _linked(number: int, alike: BoolArray, regions: Regions) -> BoolArray:

@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+import torch
 
 from sdf2vec.api import render
 from sdf2vec.fit import descents, peeling, pruning, sparse
@@ -164,7 +165,9 @@ def test_what_has_many_holes_is_whole_and_each_hole_is_a_shape_in_the_ground_s_c
     bars = (box(20, 60, 30, 75), box(42, 40, 52, 75), box(64, 20, 74, 75))
     layers = apart(painted((box(10, 10, 86, 86), BLUE, 1.0), *((bar, WHITE, 1.0) for bar in bars)))
     below, *holes = layers
-    assert [layer.seen[0].color for layer in layers] == [pytest.approx(c, abs=0.01) for c in (BLUE, *[WHITE] * 3)]
+    assert [layer.seen[0].color for layer in layers] == [
+        pytest.approx(c, abs=0.01) for c in (BLUE, *[WHITE] * 3)
+    ]
     assert all([shape.kind for shape in layer.shapes] == ["box"] for layer in layers)
     assert below.shapes[0].named()["half_size"] == pytest.approx((38 / 96,) * 2, abs=0.003)
     across = sorted(layer.shapes[0].named()["center"][0] for layer in holes)
@@ -177,6 +180,46 @@ def test_what_reaches_the_edge_of_the_picture_is_no_hole():
     (hole,) = peeling.holes(regions := Regions.of(pixels), WHITE)
     assert regions.areas[hole.inside] == pytest.approx([100], rel=0.01)
     assert [*peeling.holes(regions.hidden(~hole.inside), WHITE)] == []  # of what is gone there is none
+
+
+def rounded(radius):
+    """All of the picture but its corners, which are so round."""
+    x, y = points()
+    beyond = [np.maximum(abs(each - SIDE / 2) - (SIDE / 2 - radius), 0) for each in (x, y)]
+    return np.hypot(*beyond) < radius
+
+
+def peeled_off(pixels, ground=BLUE):
+    """What a picture is told as, where its ground is said to be of a colour."""
+    scene = replace(bare(), background=torch.tensor([*ground, 1.0]).float())
+    return to_scene(peeled(scene, [view_of(pixels)], search_of()), SIDE, SIDE)
+
+
+def test_a_plate_from_side_to_side_is_a_shape_on_the_colour_of_the_corners():
+    pixels = painted(
+        (rounded(16), BLUE, 1.0), (disc(40, 50, 12), WHITE, 1.0), (box(60, 20, 80, 70), RED, 1.0)
+    )
+    scene = peeled_off(pixels)
+    assert scene.background == pytest.approx(WHITE, abs=0.005)
+    (plate,), *others = (layer.shapes for layer in scene.layers)
+    assert plate.kind == "box"
+    assert plate.color == pytest.approx(BLUE, abs=0.005)
+    assert sorted(shape.kind for (shape,) in others) == ["box", "circle"]
+    error = render(scene, SIDE, SIDE)[..., :3] - pixels
+    assert abs(error[:20, :20]).mean() < 0.02  # without the plate 0.21·16²/20² of about 0.63: 0.09
+
+
+def test_between_corners_of_two_colours_there_is_no_plate():
+    pixels = painted((box(0, 0, 48, 96), RED, 1.0), (rounded(16), BLUE, 1.0))
+    assert peeled_off(pixels).background == pytest.approx(BLUE, abs=0.005)
+
+
+def test_a_plate_of_no_shape_is_the_ground():
+    notched = ~(box(0, 0, 30, 10) | box(66, 0, 96, 20) | box(0, 76, 9, 96) | box(80, 80, 96, 96))
+    pixels = painted((notched, BLUE, 1.0))
+    made = peeled_off(pixels)
+    assert made.background == pytest.approx(BLUE, abs=0.005)
+    assert [layer.shapes[0].color for layer in made.layers] == [pytest.approx(WHITE, abs=0.005)] * 4
 
 
 def test_what_no_few_shapes_have_the_outline_of_is_left():
