@@ -96,8 +96,8 @@ class Outlines:
         return _apart(sorted(found, key=lambda each: each.rank), regions)
 
     def plate(self, regions: Regions) -> Outlined | None:
-        """What lies under all else in the ground's colour, and leaves nothing of the picture but its four corners, in
-        another one: if it is a shape, that one is the ground.
+        """The shape in the ground's colour that covers all of the picture but its four corners, which are of another
+        one; None if there is none.
         """
         corners, ground = cornered(regions), self.scene.background.numpy()[: regions.colors.shape[1]]
         if not corners.any() or _of_color(regions, ground)[corners].any():
