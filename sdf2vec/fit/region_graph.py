@@ -16,6 +16,7 @@ from ..arrays import BoolArray, Float64Array, IntArray
 from .windows import NOWHERE, Part, Sides, extent, moved
 
 STEADY, EVEN = 1.5 / 255, 4.0 / 255  # how far neighbours of a flat region differ at most; and any two of it
+MOSTLY = 0.95  # share of its pixels that are so even; near its edges others ring
 LEAST = 6  # pixels of a region
 MOST = 320  # regions, the largest
 REACH, SURELY = (
@@ -46,8 +47,9 @@ class Regions:
         )
         labels, sure, colors = np.zeros_like(parts), np.zeros(parts.shape, bool), []
         for inside in largest(parts, LEAST):
-            if (np.ptp(pixels[inside], axis=0) <= EVEN).all():
-                colors.append(np.median(pixels[inside], axis=0))
+            color = np.median(pixels[inside], axis=0)
+            if np.mean(np.abs(pixels[inside] - color).max(axis=1) <= EVEN / 2) >= MOSTLY:
+                colors.append(color)
                 labels[inside] = len(colors)
         known = np.array(colors).reshape(-1, pixels.shape[2])
         if colors:

@@ -7,6 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 import torch
+from PIL import Image
 
 from sdf2vec.api import render
 from sdf2vec.fit import descents, peeling, pruning, sparse
@@ -78,6 +79,32 @@ def test_a_gradient_is_no_region():
     regions = Regions.of(pixels)
     assert len(regions.colors) == 1
     assert not regions.labels[40, 50]
+
+
+@pytest.mark.parametrize(
+    "layers", [((disc(48, 48, 30), BLUE),), ((box(20, 15, 76, 81), GREEN), (disc(48, 48, 15), WHITE))]
+)
+def test_what_was_made_smaller_has_the_regions_that_it_had(layers):
+    """By Pillow, whose filter rings beside edges, by some levels."""
+    large = painted(*((mask, color, 1.0) for mask, color in layers), finer=1)
+    side = (2 * SIDE, 2 * SIDE)
+    small = Image.fromarray(np.uint8(large * 255)).resize(side, Image.Resampling.LANCZOS)
+    given = Drawn.of(Picture((np.asarray(small, np.float32) / 255).astype(np.float32))).pixels.astype(
+        np.float64
+    )
+    found = Regions.of(given)
+    assert (found.labels > 0).all()
+    wanted = Regions.of(painted(*((mask, color, 1.0) for mask, color in layers)))
+    assert found.areas == pytest.approx(4 * wanted.areas, rel=0.02)
+    assert found.colors == pytest.approx(wanted.colors, abs=2 / 255)
+
+
+@pytest.mark.parametrize(("columns", "regions"), [(5, 1), (12, 0)])
+def test_what_is_shaded_is_no_region_but_for_a_little_at_its_edge(columns, regions):
+    """By a level more from one column to the next, up to five, at the right; of 96 columns 3 or 10 by more than two."""
+    pixels = painted(ground=BLUE)
+    pixels[:, -columns:] += np.arange(1, columns + 1).clip(max=5)[:, None] / 255
+    assert len(Regions.of(pixels).colors) == regions
 
 
 def test_neighbours_of_one_colour_become_one_region():
