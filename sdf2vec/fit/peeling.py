@@ -52,8 +52,10 @@ def peeled(scene: SceneTensors, views: Sequence[View], search: Search) -> SceneT
     outlines = Outlines(scene, [Surroundings.of(scene, 0, view) for view in views], search)
     finest = outlines.around[-1]
     if plate := outlines.plate(regions):
-        scene = replace(scene, background=_opaque_color(regions.colors[plate.overlay.outside][0]))
-        regions = regions.hidden(plate.overlay.outside)
+        corners = plate.overlay.outside
+        scene = replace(scene, background=_opaque_color(regions.colors[corners][0]))
+        # as if the plate went on there: what ends at its round corners is seen to end
+        regions = regions.recolored(corners, plate.overlay.color, regions.doubts[corners])
     found, parts = hairlines(regions, finest, search.kinds)
     regions = regions.hidden(parts)
     while len(found) < MOST and not outlines.are_hopeless and (top := outlines.topmost(regions)):

@@ -15,8 +15,9 @@ from scipy.sparse.csgraph import connected_components
 from ..arrays import BoolArray, Float64Array, IntArray
 from .windows import NOWHERE, Part, Sides, extent, moved
 
-STEADY, EVEN = 1.5 / 255, 4.0 / 255  # how far neighbours of a flat region differ at most; and any two of it
-MOSTLY = 0.95  # share of its pixels that are so even; near its edges others ring
+# how far neighbours of a flat region differ at most; and any two of most of its pixels
+STEADY, EVEN = 1.5 / 255, 4.0 / 255
+MOSTLY = 0.95  # of them; near its edges others ring
 LEAST = 6  # pixels of a region
 MOST = 320  # regions, the largest
 REACH, SURELY = (

@@ -236,6 +236,16 @@ def test_a_plate_from_side_to_side_is_a_shape_on_the_colour_of_the_corners():
     assert abs(error[:20, :20]).mean() < 0.02  # without the plate 0.21·16²/20² of about 0.63: 0.09
 
 
+def test_what_lies_on_a_plate_ends_at_its_round_corners():
+    stripe = rounded(16) & box(0, 0, 96, 30)
+    pixels = painted((rounded(16), BLUE, 1.0), (stripe, RED, 1.0))
+    scene = peeled_off(pixels)
+    assert scene.background == pytest.approx(WHITE, abs=0.005)
+    assert len(scene.layers) == 2
+    error = render(scene, SIDE, SIDE)[..., :3] - pixels
+    assert abs(error[:20, :20]).mean() < 0.04  # red all over: 0.09
+
+
 def test_between_corners_of_two_colours_there_is_no_plate():
     pixels = painted((box(0, 0, 48, 96), RED, 1.0), (rounded(16), BLUE, 1.0))
     assert peeled_off(pixels).background == pytest.approx(BLUE, abs=0.005)
