@@ -33,7 +33,7 @@ from .shapes import KINDS
 from .units import ANGLE, Parameter, Unit
 
 MAGIC = b"\x89sdf"
-VERSION = 1
+VERSION = 2  # the latest; a file is of the first that has all its numbers
 PRECISIONS = ("place", "falloff", "color", "opacity")  # of codecs
 MOST_BITS = 24
 BITS_OF_BITS = 5
@@ -76,11 +76,14 @@ Scales = Mapping[str, Scale]  # by the name of a unit
 
 @dataclass(frozen=True)
 class Numbering:
-    """How the numbers of a scene are written: its sorts of shapes, a scale for each unit, and the bits of steps."""
+    """How the numbers of a scene are written: its sorts of shapes, a scale for each unit, the bits of steps, and the
+    version of the file.
+    """
 
     parts: tuple[Part, ...]
     scales: Scales
     bits: Bits
+    version: int = VERSION
 
     @classmethod
     def of(cls, scene: Scene, bits: Bits) -> Numbering:
@@ -95,7 +98,9 @@ class Numbering:
                 if is_said(slot, layer.structure):
                     found[slot.parameter.unit.name] += values
         units = units_of(parts)
-        return cls(tuple(parts), {u.name: _scale(u, found[u.name], bits) for u in units}, bits)
+        scales = {u.name: _scale(u, found[u.name], bits) for u in units}
+        since = [parameter.since for part in parts for parameter in part.parameters]
+        return cls(tuple(parts), scales, bits, max(since, default=1))
 
 
 def _scale(unit: Unit, values: Iterable[float], bits: Bits) -> Scale:
@@ -110,15 +115,18 @@ def _scale(unit: Unit, values: Iterable[float], bits: Bits) -> Scale:
     return Scale(low, high, bits[codec.precision])
 
 
-def units_of(parts: Iterable[Part]) -> list[Unit]:
-    """The units of all numbers of some sorts of shapes and their layers, in the order in which they first appear."""
+def units_of(parts: Iterable[Part], version: int = VERSION) -> list[Unit]:
+    """The units of all numbers that some sorts of shapes and their layers have in files of a version, in the order in
+    which they first appear.
+    """
     parameters = (*LOOK, *(parameter for part in parts for parameter in part.parameters))
-    return list(dict.fromkeys(parameter.unit for parameter in parameters))
+    return list(dict.fromkeys(parameter.unit for parameter in parameters if parameter.since <= version))
 
 
-def is_said(slot: Slot, structure: Structure) -> bool:
-    """Whether a number is written: a patch has no falloff."""
-    return slot.parameter is not LOOK[1] or KINDS[structure[0].kind].patch is None
+def is_said(slot: Slot, structure: Structure, version: int = VERSION) -> bool:
+    """Whether a number is in files of a version: a patch has no falloff."""
+    is_there = slot.parameter is not LOOK[1] or KINDS[structure[0].kind].patch is None
+    return is_there and slot.parameter.since <= version
 
 
 # --- what writing and reading have in common -----------------------------------------------------------------
@@ -155,7 +163,7 @@ class _Layers:
             known = before[slot.part, slot.parameter.unit.name]
             for component in range(slot.parameter.width):
                 value = next(rest, 0)
-                if is_said(slot, structure):
+                if is_said(slot, structure, self.steps.version):
                     value = self._number(slot, component, value, known)
                     known.append(value)
                 found.append(value)
@@ -203,7 +211,7 @@ def encoded(scene: Scene, steps: Numbering) -> bytes:
     layers = _Layers(coder, steps)
     for layer in scene.layers:
         layers.numbers(layers.structure(layer.structure), _steps_of(layer, steps.scales))
-    return MAGIC + bytes([VERSION]) + coder.done()
+    return MAGIC + bytes([steps.version]) + coder.done()
 
 
 def _steps_of(layer: Layer, scales: Scales) -> list[int]:
@@ -247,11 +255,13 @@ def read(data: bytes) -> Scene:
     """The scene of a file. Raises SceneError, whose one line says what is wrong."""
     if not is_compact(data) or len(data) <= len(MAGIC):
         raise SceneError("", "no compact scene")
-    if (version := data[len(MAGIC)]) != VERSION:
-        raise SceneError("version", f"this program reads compact scenes of version {VERSION}, got {version}")
+    if not 1 <= (version := data[len(MAGIC)]) <= VERSION:
+        raise SceneError(
+            "version", f"this program reads compact scenes of versions 1 to {VERSION}, got {version}"
+        )
     try:
         coder = Reader(data, len(MAGIC) + 1)
-        scene = _read(coder)
+        scene = _read(coder, version)
     except EndedError:
         raise SceneError("", "the compact scene ends too early") from None
     if coder.left:
@@ -259,7 +269,7 @@ def read(data: bytes) -> Scene:
     return scene
 
 
-def _read(coder: Coder) -> Scene:
+def _read(coder: Coder, version: int) -> Scene:
     width, height = (_counted(coder, CANVAS_SIDE - 1, side) + 1 for side in ("width", "height"))
     compositing = one_of(_read_word(coder) or OVER, "compositing", COMPOSITING)
     ground = _read_ground(coder)
@@ -267,9 +277,12 @@ def _read(coder: Coder) -> Scene:
     bits = {name: coder.raw(0, BITS_OF_BITS) for name in PRECISIONS}
     if not all(1 <= count <= MOST_BITS for count in bits.values()):
         raise SceneError("bits", f"must be 1 to {MOST_BITS}, got {list(bits.values())}")
-    scales = {unit.name: _read_scale(coder, bits[unit.codec.precision]) for unit in units_of(parts)}
+    units = units_of(parts, version)
+    steps = Numbering(
+        parts, {unit.name: _read_scale(coder, bits[unit.codec.precision]) for unit in units}, bits, version
+    )
     count = _counted(coder, MAX_SHAPES if parts else 0, "layers")
-    layers = _Layers(coder, Numbering(parts, scales, bits))
+    layers = _Layers(coder, steps)
     found: list[Layer] = []
     shapes = 0
     for index in range(count):
@@ -278,19 +291,19 @@ def _read(coder: Coder) -> Scene:
             shapes += len(structure)
             if shapes > MAX_SHAPES:
                 raise SceneError("shapes", f"at most {MAX_SHAPES}")
-            found.append(Layer.from_numbers(structure, _values(structure, layers.numbers(structure), scales)))
+            found.append(Layer.from_numbers(structure, _values(structure, layers.numbers(structure), steps)))
     return Scene(width, height, tuple(found), ground, compositing)
 
 
-def _values(structure: Structure, steps: Iterable[int], scales: Scales) -> list[float]:
-    """A layer's row from its steps."""
-    rest, found = iter(steps), []
+def _values(structure: Structure, row: Iterable[int], steps: Numbering) -> list[float]:
+    """A layer's row from its steps; 0 for what the file does not say."""
+    rest, found = iter(row), []
     for slot in slots(structure):
         for _ in range(slot.parameter.width):
             step, unit = next(rest), slot.parameter.unit
             found.append(
-                _legal(scales[unit.name].value(step, unit), slot.parameter)
-                if is_said(slot, structure)
+                _legal(steps.scales[unit.name].value(step, unit), slot.parameter)
+                if is_said(slot, structure, steps.version)
                 else 0.0
             )
     return found

@@ -29,8 +29,8 @@ from .units import FALLOFF, OPACITY, SMOOTHNESS, Parameter
 
 ROW_OPACITY = 1  # place of the opacity among `Formula.uniforms`
 NEVER = 1e9  # scene units: a distance that is never met
-LOOK = (Parameter("opacity", OPACITY, (1.0,)), Parameter("falloff", FALLOFF))
-JOIN = Parameter("smoothness", SMOOTHNESS)
+LOOK = (Parameter("opacity", OPACITY, (1.0,), optional=True), Parameter("falloff", FALLOFF, optional=True))
+JOIN = Parameter("smoothness", SMOOTHNESS, optional=True)
 WORDS = ("kind", "paint", "join", "shapes")  # what a scene file says of a shape or a layer besides numbers
 STILL = const(0.0)
 P, PIXEL = var("p", VEC2), var("pixel")

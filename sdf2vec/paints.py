@@ -12,14 +12,17 @@ from typing import NamedTuple
 
 from .expr import Expr, clamp, dot, mix
 from .function import function
-from .operation import VEC2, VEC3
-from .units import COLOR, DIRECTION, Parameter
+from .operation import FLOAT, VEC2, VEC3
+from .units import COLOR, DIRECTION, SHIFT, Parameter
 
 
 class Ramp(NamedTuple):
-    """A linear gradient: how it rises from 0 to 1 along the axes of a shape's frame, its colours at 0 and at 1."""
+    """A linear gradient: how it rises from 0 to 1 along the axes of a shape's frame, what it is in the frame's middle,
+    its colours at 0 and at 1.
+    """
 
     slope: tuple[float, float]
+    middle: float
     first: tuple[float, float, float]
     last: tuple[float, float, float]
 
@@ -27,8 +30,8 @@ class Ramp(NamedTuple):
 @dataclass(frozen=True, eq=False)
 class Paint:
     """`color(q, color, *own)` is the colour (vec3) at a point q of the shape's frame, in which the shape reaches from
-    about −1 to 1 along both axes. `own` are the parameters after `color`. `ramp(color, *own)` is for vector formats: a
-    linear gradient whose middle is that of the frame.
+    about −1 to 1 along both axes. `own` are the parameters after `color`. `ramp(color, *own)` is for vector formats:
+    the linear gradient that it is.
     """
 
     name: str
@@ -50,10 +53,10 @@ class Paint:
 BASE = Parameter("color", COLOR, (0.0, 0.0, 0.0))
 
 
-@function("linearPaint", q=VEC2, color=VEC3, color_end=VEC3, direction=VEC2)
-def linear_paint(q: Expr, color: Expr, color_end: Expr, direction: Expr) -> Expr:
-    """From one colour to another along a direction of the shape's frame, half of each at its middle."""
-    return mix(color, color_end, clamp(0.5 + dot(q, direction), 0.0, 1.0))
+@function("linearPaint", q=VEC2, color=VEC3, color_end=VEC3, direction=VEC2, shift=FLOAT)
+def linear_paint(q: Expr, color: Expr, color_end: Expr, direction: Expr, shift: Expr) -> Expr:
+    """From one colour to another along a direction of the shape's frame; without a shift half of each at its middle."""
+    return mix(color, color_end, clamp(0.5 + shift + dot(q, direction), 0.0, 1.0))
 
 
 PAINTS: dict[str, Paint] = {
@@ -63,8 +66,12 @@ PAINTS: dict[str, Paint] = {
         Paint(
             "linear",
             linear_paint,
-            (Parameter("color_end", COLOR, (0.0, 0.0, 0.0)), Parameter("direction", DIRECTION, (0.5, 0.0))),
-            ramp=lambda color, color_end, direction: Ramp(direction, color, color_end),
+            (
+                Parameter("color_end", COLOR, (0.0, 0.0, 0.0)),
+                Parameter("direction", DIRECTION, (0.5, 0.0)),
+                Parameter("shift", SHIFT, optional=True, since=2),
+            ),
+            ramp=lambda color, color_end, direction, shift: Ramp(direction, 0.5 + shift, color, color_end),
         ),
     )
 }

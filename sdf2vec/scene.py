@@ -38,7 +38,6 @@ Value = float | tuple[float, ...]  # of a parameter
 BLACK: Color = (0.0, 0.0, 0.0)
 GROUND = Parameter("background", BACKGROUND, BLACK)
 SHEER = Parameter("background", BACKGROUND, (*BLACK, 0.0))  # with an alpha of its own
-OPTIONAL = (*LOOK, JOIN)  # where no value is given, it is that of `start`
 
 
 class SceneError(Sdf2vecError):
@@ -127,7 +126,7 @@ def _record(parameters: tuple[Parameter, ...]) -> type[msgspec.Struct]:
         least = Meta(gt=low) if parameter.positive else Meta(ge=low)
         number = Annotated[float, least, Meta(le=high)]
         hint: Any = number if parameter.width == 1 else tuple[(number,) * parameter.width]  # type: ignore[misc]
-        default = [parameter.values_from(parameter.start)] if parameter in OPTIONAL else []
+        default = [parameter.values_from(parameter.start)] if parameter.optional else []
         fields.append((parameter.name, hint, *default))
     return msgspec.defstruct("Numbers", fields, kw_only=True)
 

@@ -23,7 +23,6 @@ from .layer import JOIN, LOOK, Part
 from .paints import FLAT, PAINTS
 from .scene import (
     MAX_SHAPES,
-    OPTIONAL,
     Joined,
     Layer,
     Scene,
@@ -42,7 +41,6 @@ from .units import Parameter
 
 FORMAT = "sdf2vec scene"
 VERSION = 2
-USUAL = {parameter.name: parameter.values_from(parameter.start) for parameter in OPTIONAL}
 
 
 class _File(msgspec.Struct):
@@ -89,8 +87,9 @@ def _words(part: Part) -> dict[str, str]:
 
 def _told(parameters: tuple[Parameter, ...], rest: Iterator[float]) -> dict[str, Any]:
     """What a file says of some parameters, whose numbers come next in a row."""
+    usual = {p.name: p.values_from(p.start) for p in parameters if p.optional}
     values = named(parameters, rest).items()
-    return {name: value for name, value in values if name not in USUAL or value != USUAL[name]}
+    return {name: value for name, value in values if name not in usual or value != usual[name]}
 
 
 def _json(value: Any) -> str:

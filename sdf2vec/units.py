@@ -20,7 +20,8 @@ MARGIN = 0.3  # scene units that a position may leave the canvas by
 LONGEST = 1.5  # longest sides of the canvas
 LEAST_SMOOTHNESS = 1e-3  # scene units: of a join that is smooth at all
 HIGHEST_FREQUENCY = 60.0  # radians per scene unit
-STEEPEST = 4.0  # of a gradient: ranges of colour across half a shape
+STEEPEST = 10.0  # of a gradient: ranges of colour across half a shape
+FARTHEST = 6.0  # of those by which its middle is off that of the shape
 FAINTEST = 0.02  # opacity where colours are not signed: below it a shape would stop learning
 GRAIN = 0.001  # scene units: falloffs much below it are packed in equal steps
 GEOMETRY_DECIMALS = 6
@@ -131,14 +132,17 @@ class Unit:
 class Parameter:
     """One parameter of a shape, a paint or a layer.
 
-    `start` is the value for a shape of size 1 at the origin: what `unit.start` takes. The unit's least value is
-    excluded where it is `positive`.
+    `start` is the value for a shape of size 1 at the origin: what `unit.start` takes; and if it is `optional`, the
+    value where a file has none. The unit's least value is excluded where it is `positive`. Compact files have it from
+    the version `since` on.
     """
 
     name: str
     unit: Unit
     start: tuple[float, ...] = (0.0,)
     positive: bool = False
+    optional: bool = False
+    since: int = 1
 
     @property
     def width(self) -> int:
@@ -177,6 +181,10 @@ def _turned(values: tuple[float, ...], placed: Placed) -> Any:
 def _turned_vectors(vectors: Any, placed: Placed) -> Any:
     across = vectors.flip(1) * vectors.new_tensor((-1.0, 1.0))
     return placed.turns.cos()[:, None] * vectors + placed.turns.sin()[:, None] * across
+
+
+def _start_alike(values: tuple[float, ...], placed: Placed) -> Any:
+    return placed.turns.new_tensor(values).repeat(len(placed.turns), 1)
 
 
 def _start_length(values: tuple[float, ...], placed: Placed) -> Any:
@@ -347,6 +355,15 @@ DIRECTION = Unit(
     _always_within(-STEEPEST, STEEPEST),
     Codec(_between("direction")),
     _turned,
+)
+SHIFT = Unit(
+    "shift",
+    -1000.0,
+    1000.0,
+    0.06,
+    _always_within(-FARTHEST, FARTHEST),
+    Codec(_between("shift")),
+    _start_alike,
 )
 COLOR = Unit(
     "color",

@@ -10,6 +10,11 @@ from sdf2vec.paints import PAINTS
 from sdf2vec.shapes import KINDS
 
 PATCHES = tuple(name for name, kind in KINDS.items() if kind.patch is not None)
+# in base64, of version 1, in steps of 12 bits: see tests/scene/test_compact_files.py
+FIRST_COMPACT = (
+    "iXNkZgH6HvgGP/////7j08sezKA2ad2XDyAAMW/wAAAGMYx/3p/9Pvxn/en/en/O//en+eP3v+On/6I2r//yP/2f/gDg07aKJFpFLtpP/9/JZXMxd8"
+    "4CMkRdOfR5g2LH"
+)
 SOFT = tuple(name for name in KINDS if name not in PATCHES)  # kinds with a soft edge, which can be joined
 
 
@@ -24,6 +29,10 @@ def random_shape(kind: str, r: random.Random, lowest: float = 0.0, paint: str = 
     def patch():
         return (x, y, size * 0.5, size * 0.5 * r.uniform(0.3, 1.2), r.uniform(-7, 7))
 
+    def gradient():
+        end, across, down = color(), r.uniform(-1, 1), r.uniform(-1, 1)
+        return (*end, across, down, across * down)
+
     numbers = {
         "circle": lambda: (x, y, size),
         "ellipse": lambda: (x, y, size, size * r.uniform(0.2, 1.2), r.uniform(-7, 7)),
@@ -34,7 +43,7 @@ def random_shape(kind: str, r: random.Random, lowest: float = 0.0, paint: str = 
         "gaussian": patch,
         "gabor": lambda: (*patch(), r.uniform(-40, 40), r.uniform(0, 6)),
     }[kind]()
-    own = {"flat": tuple, "linear": lambda: (*color(), r.uniform(-1, 1), r.uniform(-1, 1))}[paint]()
+    own = {"flat": tuple, "linear": gradient}[paint]()
     return Shape(kind, numbers, first, paint, own)
 
 

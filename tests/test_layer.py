@@ -60,11 +60,11 @@ def test_a_row_has_a_place_for_every_number():
     )
     named = [f"{slot.parameter.name}{slot.suffix}" for slot in slots(structure)]
     assert named == [
-        *("opacity", "falloff", "color_0", "color_end_0", "direction_0", "center_0", "radius_0"),
+        *("opacity", "falloff", "color_0", "color_end_0", "direction_0", "shift_0", "center_0", "radius_0"),
         *("smoothness_1", "center_1", "half_size_1", "angle_1", "corner_radius_1"),
         *("smoothness_2", "color_2", "center_2", "radii_2", "angle_2", "frequency_2", "phase_2"),
     ]
-    assert row_width(structure) == 2 + 8 + 3 + 1 + 6 + 1 + 3 + 7
+    assert row_width(structure) == 2 + 9 + 3 + 1 + 6 + 1 + 3 + 7
 
 
 @pytest.mark.parametrize(

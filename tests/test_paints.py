@@ -7,7 +7,7 @@ import pytest
 import torch
 
 from sdf2vec import Layer, Scene, Shape
-from sdf2vec.expr import constant, var, vec2, vec3
+from sdf2vec.expr import const, constant, var, vec2, vec3
 from sdf2vec.graph import components_of, scalarize
 from sdf2vec.layer import Formula, P, Part
 from sdf2vec.lower.torch import compile_torch
@@ -54,7 +54,7 @@ def test_every_kind_has_a_frame_by_hand():
 @pytest.mark.parametrize(("kind", "numbers", "start", "end"), ENDS, ids=[row[0] for row in ENDS])
 def test_a_linear_paint_goes_along_the_axis_of_the_frame(kind, numbers, start, end):
     """With direction (1/2, 0): its first colour at −1, half of each in the middle, its last at 1 and beyond."""
-    shape = Shape(kind, numbers, FIRST, "linear", (*LAST, 0.5, 0.0))
+    shape = Shape(kind, numbers, FIRST, "linear", (*LAST, 0.5, 0.0, 0.0))
     shares = np.array([-0.5, 0.0, 0.25, 0.5, 1.0, 1.5])
     x, y = (a + shares * (b - a) for a, b in zip(start, end, strict=True))
     want = np.outer(FIRST, 1 - shares.clip(0, 1)) + np.outer(LAST, shares.clip(0, 1))
@@ -63,7 +63,7 @@ def test_a_linear_paint_goes_along_the_axis_of_the_frame(kind, numbers, start, e
 
 def test_the_direction_says_how_steep_and_where_to():
     """t = 1/2 + q·direction: a quarter turn goes down the frame's y axis, twice as long twice as fast."""
-    shape = Shape("ellipse", (0, 0, 0.4, 0.2, 0.0), FIRST, "linear", (*LAST, 0.0, 1.0))
+    shape = Shape("ellipse", (0, 0, 0.4, 0.2, 0.0), FIRST, "linear", (*LAST, 0.0, 1.0, 0.0))
     y = np.array([-0.2, -0.1, -0.05, 0.0, 0.05, 0.1, 0.2])
     share = (0.5 + y / 0.2).clip(0, 1)
     want = np.outer(FIRST, 1 - share) + np.outer(LAST, share)
@@ -71,24 +71,34 @@ def test_the_direction_says_how_steep_and_where_to():
 
 
 def test_no_direction_is_half_of_each():
-    shape = Shape("circle", (0, 0, 0.4), FIRST, "linear", (*LAST, 0.0, 0.0))
+    shape = Shape("circle", (0, 0, 0.4), FIRST, "linear", (*LAST, 0.0, 0.0, 0.0))
     np.testing.assert_allclose(color_at(shape, np.array([9.0]), np.array([-9.0])), [[0.5], [0.375], [0.5]])
 
 
 def test_a_shape_of_no_size_has_a_colour():
-    shape = Shape("triangle", (0.1,) * 6, FIRST, "linear", (*LAST, 0.5, 0.5))
+    shape = Shape("triangle", (0.1,) * 6, FIRST, "linear", (*LAST, 0.5, 0.5, 0.0))
     assert np.isfinite(color_at(shape, np.array([0.1, 0.2]), np.array([0.1, 5.0]))).all()
 
 
+def test_a_shift_moves_the_middle():
+    """t = 1/2 + q·direction + shift: with a direction of one half and a shift of 1/4 from −3/2 to 1/2 of the frame."""
+    shape = Shape("circle", (0, 0, 0.4), FIRST, "linear", (*LAST, 0.5, 0.0, 0.25))
+    x = 0.4 * np.array([-2.0, -1.5, -0.5, 0.0, 0.5, 1.0])
+    share = np.array([0.0, 0.0, 0.5, 0.75, 1.0, 1.0])
+    want = np.outer(FIRST, 1 - share) + np.outer(LAST, share)
+    np.testing.assert_allclose(color_at(shape, x, 0 * x), want, atol=1e-12)
+
+
+@pytest.mark.parametrize("shift", [0.0, 0.7, -3.0])
 @pytest.mark.parametrize("direction", [(0.5, 0.0), (0.3, -0.4), (-2.0, 1.0)])
-def test_the_ramp_is_where_the_colours_end(direction):
+def test_the_ramp_is_where_the_colours_end(direction, shift):
     ramp = PAINTS["linear"].ramp
     assert ramp is not None
-    slope, first, last = ramp(FIRST, LAST, direction)
+    slope, middle, first, last = ramp(FIRST, LAST, direction, shift)
     steepness = slope[0] ** 2 + slope[1] ** 2
-    for side, color in ((-0.5, first), (0.5, last)):
+    for side, color in ((0.0 - middle, first), (1.0 - middle, last)):
         point = (side * slope[0] / steepness, side * slope[1] / steepness)
-        found = linear_paint(vec2(*point), vec3(*FIRST), vec3(*LAST), vec2(*direction))
+        found = linear_paint(vec2(*point), vec3(*FIRST), vec3(*LAST), vec2(*direction), const(shift))
         assert [constant(part) for part in scalarize(found)] == pytest.approx(color)
 
 
@@ -101,6 +111,6 @@ def test_all_paints_begin_with_a_colour_and_one_is_flat():
 
 def test_a_picture_of_a_linear_paint():
     """A box beyond the canvas whose red goes from 0 to 1 across the canvas."""
-    shape = Shape("box", (0, 0, 2.5, 9, 0, 0), (0, 0, 0), "linear", (1, 0, 0, 1, 0))
+    shape = Shape("box", (0, 0, 2.5, 9, 0, 0), (0, 0, 0), "linear", (1, 0, 0, 1, 0, 0))
     want = np.tile((np.arange(10) + 0.5) / 10, (4, 1))
     np.testing.assert_allclose(render(Scene(10, 4, (Layer((shape,)),)))[0], want, atol=1e-6)

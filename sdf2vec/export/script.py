@@ -15,7 +15,7 @@ from ..lower.javascript import function_text
 from ..lower.shader import GLSL, definition, expression, used_functions
 from ..operation import VEC2, VEC4
 from ..paints import FLAT, PAINTS
-from ..scene import GROUND, MAX_JOINED, MAX_SHAPES, OPTIONAL, SHEER
+from ..scene import GROUND, MAX_JOINED, MAX_SHAPES, SHEER
 from ..shapes import KINDS
 from ..units import COLOR, COLOR_DECIMALS, OPACITY, Parameter
 from .records import Form, Variant, record_scalars
@@ -71,7 +71,7 @@ def script_parts(forms: Sequence[Form], own: bool = False) -> dict[str, object]:
 
 def _told(parameter: Parameter) -> dict[str, object]:
     """What a script must know of a parameter to check the numbers of a file."""
-    usual = {"usual": parameter.values_from(parameter.start)} if parameter in OPTIONAL else {}
+    usual = {"usual": parameter.values_from(parameter.start)} if parameter.optional else {}
     light = {"light": True} if parameter.unit in (COLOR, OPACITY) else {}
     return {"name": parameter.name} | _needed(parameter) | light | usual
 
@@ -80,7 +80,8 @@ def _needed(parameter: Parameter) -> dict[str, object]:
     """What it must know to read the numbers of a compact file."""
     unit = parameter.unit
     told = {"unit": unit.name, "width": parameter.width, "low": int(unit.low), "high": int(unit.high)}
-    return told | ({"positive": True} if parameter.positive else {})
+    since = {"since": parameter.since} if parameter.since > 1 else {}
+    return told | since | ({"positive": True} if parameter.positive else {})
 
 
 def _compact_parts(variants: Iterable[Variant]) -> dict[str, object]:

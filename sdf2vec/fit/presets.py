@@ -16,6 +16,7 @@ STARTS, SCARCE = (
     4,
     64,
 )  # starts that are tried, at most; and times the layers: below, chance decides how near they come
+GRADED = 1.5  # times the steps where shapes have gradients: half as many numbers again
 CROWDING = 0.35  # rates of layers fall with this power of their number
 
 L1: Loss = (("l1", 1.0),)

@@ -19,7 +19,7 @@ from ..paints import FLAT, PAINTS
 from ..scene import MAX_JOINED, MAX_SHAPES, Color, Scene
 from ..scene_file import load as load_scene
 from ..shapes import KINDS
-from .presets import DEFAULT, PRESETS, SOFTEST, Loss, Preset
+from .presets import DEFAULT, GRADED, PRESETS, SOFTEST, Loss, Preset
 
 MIXED = "mixed"
 LOSS_NAMES = ("l1", "mse", "ssim", "flip")
@@ -148,6 +148,8 @@ def preset_of(settings: Settings) -> Preset:
         raise Sdf2vecError(f"the preset {settings.preset} is for --compositing {preset.compositing}")
     if settings.loss is not None:
         preset = replace(preset, phases=tuple(replace(p, loss=settings.loss) for p in preset.phases))
+    if not PAINTS[settings.paint].is_flat:
+        preset = preset.paced(GRADED)
     if settings.min_area is not None:
         preset = replace(preset, least_area=settings.min_area)
     if settings.max_falloff is not None:

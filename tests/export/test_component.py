@@ -20,7 +20,7 @@ from sdf2vec.lower.javascript import function_text
 from sdf2vec.render import reference
 from sdf2vec.scene_file import dumps
 from tests.operations import MEANINGS, expected
-from tests.scenes import random_scene
+from tests.scenes import FIRST_COMPACT, random_scene
 
 
 @pytest.fixture
@@ -88,7 +88,7 @@ def test_compact_scenes_are_read_as_python_reads_them(compositing, reading):
     ]
     files = [written(scene, dict.fromkeys(PRECISIONS, bits)) for scene in scenes for bits in (5, 13)]
     with reading() as page:
-        for file in files:
+        for file in (*files, base64.b64decode(FIRST_COMPACT)):
             compact, plain = base64.b64encode(file).decode(), json.loads(dumps(sdf2vec.loads(file)))
             found = page.evaluate(
                 "(data) => read(Uint8Array.from(atob(data), (c) => c.charCodeAt(0)))", compact

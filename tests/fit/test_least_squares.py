@@ -18,7 +18,11 @@ from sdf2vec.scene import Joint, Layer, Scene, Shape
 WIDTH, HEIGHT = 61, 50  # no whole tiles
 DISC = Layer((Shape("circle", (-0.1, 0.0, 0.3), (0.9, 0.2, 0.1)),), 0.1, 0.8)
 RAMP = Layer(
-    (Shape("box", (0.1, 0.1, 0.2, 0.1, 0.3, 0.02), (0.1, 0.5, 0.7), "linear", (0.9, 0.8, 0.1, 0.5, 0.2)),),
+    (
+        Shape(
+            "box", (0.1, 0.1, 0.2, 0.1, 0.3, 0.02), (0.1, 0.5, 0.7), "linear", (0.9, 0.8, 0.1, 0.5, 0.2, 0.1)
+        ),
+    ),
     0.05,
     0.7,
 )
@@ -126,5 +130,5 @@ def test_a_scene_without_layers_is_what_it_was():
 def test_what_is_simple():
     (group,) = scene_of(RAMP).groups
     kinds = {slot.parameter.name for slot in group.values if is_simple(slot, 0.0)}
-    assert kinds == {"opacity", "falloff", "angle", "corner_radius"}
+    assert kinds == {"opacity", "falloff", "shift", "angle", "corner_radius"}
     assert not any(is_simple(slot, 0.5) for slot in group.values)

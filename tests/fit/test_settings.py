@@ -37,6 +37,7 @@ def test_the_preset_takes_what_is_set():
     assert preset_of(settings_of(preset="thesis", min_area=0)).least_area == 0
     assert preset_of(settings_of(preset="thesis", max_falloff=0.5)).falloff == (0.01, 0.5)
     assert preset_of(settings_of(preset="thesis", max_falloff=0)).falloff == (0, 0)
+    assert preset_of(settings_of(paint="linear")).steps == 1.5 * preset_of(settings_of()).steps
     assert preset_of(settings_of(preset="thesis", max_falloff=1.2)).falloff == (0.01, 0.99)
 
 

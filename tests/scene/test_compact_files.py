@@ -1,5 +1,6 @@
 """Compact scene files: every sort of scene is read as it was written, in steps; hostile files are refused in a line."""
 
+import base64
 import random
 from dataclasses import replace
 
@@ -13,7 +14,7 @@ from sdf2vec.compact_file import MAGIC, MOST_BITS, PRECISIONS, VERSION, Numberin
 from sdf2vec.entropy import Writer
 from sdf2vec.layer import slots
 from sdf2vec.units import ANGLE
-from tests.scenes import random_scene
+from tests.scenes import FIRST_COMPACT, random_scene
 
 FINE = dict.fromkeys(PRECISIONS, 16)
 SCENES = [
@@ -64,6 +65,28 @@ def test_grey_shapes_say_their_colour_once():
     assert saved > 200 * 10 / 8
 
 
+def test_a_file_of_the_first_version_is_read():
+    """Gradients had no shift."""
+    found = loads(base64.b64decode(FIRST_COMPACT))
+    disc, box = (layer.shapes[0] for layer in found.layers)
+    assert (disc.kind, disc.paint, box.kind, box.paint) == ("circle", "linear", "box", "flat")
+    assert disc.painted() == {
+        "color": (1.0, 0.0, 0.0),
+        "color_end": (0.0, 0.0, 1.0),
+        "direction": pytest.approx((0.5, -0.25), abs=1e-3),
+        "shift": 0.0,
+    }
+    assert disc.parameters == pytest.approx((0.125, -0.0625, 0.375), abs=1e-3)
+    assert box.parameters == pytest.approx((-0.25, 0.125, 0.25, 0.125, 0.5, 0.0625), abs=1e-3)
+
+
+@pytest.mark.parametrize(("paint", "version"), [("flat", 1), ("linear", 2)])
+def test_a_file_is_of_the_first_version_that_has_all_its_numbers(paint, version):
+    data = written(random_scene(("circle",), paints=(paint,)), FINE)
+    assert data[len(MAGIC)] == version
+    assert loads(data).layers[0].shapes[0].paint == paint
+
+
 def test_a_file_is_loaded_whatever_it_is_called(tmp_path):
     path = tmp_path / "a.scene.json"
     path.write_bytes(written(SCENES[0], FINE))
@@ -106,7 +129,8 @@ def head(*, width=1, compositing="", channels=0, kinds=("circle",), bits=(8, 8, 
     ("data", "words"),
     [
         (MAGIC, "no compact scene"),
-        (MAGIC + b"\x02rest", "version 1, got 2"),
+        (MAGIC + b"\x00rest", "versions 1 to 2, got 0"),
+        (MAGIC + b"\x03rest", "versions 1 to 2, got 3"),
         (MAGIC + bytes([VERSION]), "ends too early"),
         (head(width=65537), "width: must be at most 65535, got 65536"),
         (head(compositing="multiply"), "compositing: must be one of over, additive"),

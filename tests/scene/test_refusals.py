@@ -245,7 +245,7 @@ def test_layers_and_shapes_refuse_the_same_in_python():
         Layer((SPOT, SPOT), 0.1)
     with pytest.raises(SceneError, match=r"^shapes\[1\].smoothness: must be >= 0, got -1$"):
         Layer.union((SPOT, SPOT), -1, 0.1)
-    with pytest.raises(SceneError, match=r"^paint_parameters: the paint linear has 5 numbers, got 1$"):
+    with pytest.raises(SceneError, match=r"^paint_parameters: the paint linear has 6 numbers, got 1$"):
         Shape("circle", (0, 0, 1), (0, 0, 0), "linear", (1,))
     with pytest.raises(SceneError, match=r"^width: must be <= 65536"):
         Scene(10**4000, 1, ())

@@ -52,8 +52,8 @@ def fill_of(layer: Layer, canvas: Canvas, lift: float = 0.0) -> LayerFill:
     return LayerFill(LinearGradient(start, end, stops), 255.0 * off * max(layer.opacity, 1e-3))
 
 
-def ramp_of(shape: Shape, canvas: Canvas, lift: float = 0.0) -> LinearGradient | None:
-    """A paint that is a linear gradient as one; None for any other, and where the gradient is next to none."""
+def ramp_of(shape: Shape, canvas: Canvas, lift: float = 0.0) -> LinearGradient | Color | None:
+    """A paint that is a linear gradient as one, or as a colour where it is next to none; None for any other."""
     ramp_from, frame = PAINTS[shape.paint].ramp, frame_of(shape)
     if ramp_from is None:
         return None
@@ -64,8 +64,9 @@ def ramp_of(shape: Shape, canvas: Canvas, lift: float = 0.0) -> LinearGradient |
     )  # along x and y of the scene
     steepness = float(slope @ slope)
     if steepness < FLAT:
-        return None
-    ends = frame.origin + np.outer((-0.5, 0.5), slope / steepness)
+        share = min(max(ramp.middle, 0.0), 1.0)
+        return moved([a + share * (b - a) for a, b in zip(ramp.first, ramp.last, strict=True)], lift)
+    ends = frame.origin + np.outer((-ramp.middle, 1.0 - ramp.middle), slope / steepness)
     start, end = pairs(canvas.places(ends))
     return LinearGradient(start, end, (Stop(0.0, moved(ramp.first, lift)), Stop(1.0, moved(ramp.last, lift))))
 

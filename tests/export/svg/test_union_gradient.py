@@ -25,12 +25,22 @@ def test_a_linear_paint_is_its_gradient():
     """A direction of one half goes from −1 to 1 of the frame: from edge to edge of the disc."""
     shape = Shape.of("circle", RED, paint="linear", color_end=BLUE, direction=(0.5, 0), **PLACE)
     ramp = ramp_of(shape, CANVAS)
-    assert ramp is not None
+    assert isinstance(ramp, LinearGradient)
     assert ramp.start == pytest.approx((100.0, 100.0))
     assert ramp.end == pytest.approx((200.0, 100.0))
     assert [stop.color for stop in ramp.stops] == [RED, BLUE]
     assert fill_of(Layer((shape,), 0.1), CANVAS) == (ramp, 0.0)
     assert mean_color(shape) == (0.5, 0.0, 0.5)
+
+
+def test_a_shifted_paint_is_a_shifted_gradient():
+    """With a shift of one quarter half of each is halfway from the middle to where it begins."""
+    values = {"paint": "linear", "color_end": BLUE, "shift": 0.25, **PLACE}
+    ramp = ramp_of(Shape.of("circle", RED, direction=(0.5, 0), **values), CANVAS)
+    assert isinstance(ramp, LinearGradient)
+    assert ramp.start == pytest.approx((75.0, 100.0))
+    assert ramp.end == pytest.approx((175.0, 100.0))
+    assert ramp_of(Shape.of("circle", RED, direction=(0, 0), **values), CANVAS) == (0.25, 0.0, 0.75)
 
 
 def test_two_colours_of_a_union_lie_along_a_line():
