@@ -27,6 +27,7 @@ from .transparency import Overlay
 from .windows import Part
 
 EXACT = 0.36  # pixels by which an outline is off in the mean, at most
+LEAST_SIDE = 12  # pixels of one of its sides: the outer one, and those around holes
 LEAST_OFF = 0.15  # below that an outline is no better
 GROSSLY = 0.01  # share of it that may be wrong in finer surroundings, by more than an edge
 GOOD = 0.25  # share of a layer that its shape may miss, at most
@@ -42,13 +43,15 @@ TINY = 1e-9
 class Outlined:
     """A layer of one shape, or of several that are joined, for an overlay; of strokes `more` layers with it.
 
-    `off`: by how many pixels its outline is off, in the mean; `missed`: the share of the overlay that is wrong;
-    `bitten`: whether what is cut out of it goes beyond its edge; `soft`: whether the overlay's edge is.
+    `off`: by how many pixels its outline is off, in the mean, and `worst`: on the side where that is most; `missed`:
+    the share of the overlay that is wrong; `bitten`: whether what is cut out of it goes beyond its edge; `soft`:
+    whether the overlay's edge is.
     """
 
     layer: Group
     overlay: Overlay
     off: float
+    worst: float
     missed: float
     bitten: bool
     soft: bool
@@ -67,6 +70,11 @@ class Outlined:
     def is_good(self) -> bool:
         """Whether it has the overlay's outline."""
         return self.off < EXACT and self.missed < GOOD
+
+    @property
+    def is_unlikely(self) -> bool:
+        """Whether it has the outline of what may well be part of another shape, or is not as exact on each side."""
+        return self.bitten or self.worst >= EXACT
 
     @property
     def is_joined(self) -> bool:
@@ -95,7 +103,7 @@ class Outlined:
     def rank(self) -> tuple[bool, bool, int, float]:
         """What is the less the likelier: of translucent layers what explains the most regions is."""
         covered = 0 if self.is_opaque else -int(self.overlay.inside.sum())
-        return self.bitten, self.is_joined, covered, self.score
+        return self.is_unlikely, self.is_joined, covered, self.score
 
     @property
     def is_plain(self) -> bool:
@@ -148,6 +156,23 @@ class Area:
         return float(max((inside & ndimage.binary_dilation(known & ~inside)).sum(), 1))
 
     @cached_property
+    def sides(self) -> tuple[torch.Tensor, torch.Tensor]:
+        """Which side of its outline is nearest to each point [P], the outer one or one around a hole; their lengths [S]
+        in pixels. Short ones are as good as none.
+        """
+        inside, known = (self.around.plane(mask > 0.5) for mask in (self.inside, self.known))
+        parts, count = ndimage.label(known & ~inside, FULL)
+        if count == 0:
+            return torch.zeros(inside.size, dtype=torch.long), torch.tensor([self.edge])
+        rows, columns = ndimage.distance_transform_edt(
+            parts == 0, return_distances=False, return_indices=True
+        )
+        beside = ndimage.maximum_filter(parts, footprint=ndimage.generate_binary_structure(2, 1))
+        lengths = np.bincount(beside[inside], minlength=count + 1)[1:].astype(np.float32)
+        lengths[lengths < LEAST_SIDE] = np.inf
+        return torch.from_numpy(parts[rows, columns].ravel() - 1).long(), torch.from_numpy(lengths)
+
+    @cached_property
     def coverage(self) -> Float64Array:
         """How much of each pixel it covers [H, W]: at its edge by where the pixel's colour is between its own and that
         of what is beside it.
@@ -173,20 +198,21 @@ class Area:
     def outlined_together(self, layers: Sequence[Group]) -> Outlined:
         """How well some layers cover it that lie on each other."""
         first, *more = layers
-        off = float((self.cover(layers) * self.known - self.inside).abs().sum())
-        return replace(self._judged(first, off, False), more=tuple(more))
+        wrong = (self.cover(layers) * self.known - self.inside).abs()
+        return replace(self._judged(first, wrong, False), more=tuple(more))
 
     def all_outlined(self, layers: Sequence[Group]) -> list[Outlined]:
         """The same of some layers of one structure, each alone."""
-        wrong = (_covers(layers, self.around) * self.known - self.inside).abs().sum(1)
+        wrong = (_covers(layers, self.around) * self.known - self.inside).abs()
         return [
-            self._judged(layer, off, self._is_bitten(layer))
-            for layer, off in zip(layers, wrong.tolist(), strict=True)
+            self._judged(layer, own, self._is_bitten(layer)) for layer, own in zip(layers, wrong, strict=True)
         ]
 
-    def _judged(self, layer: Group, off: float, bitten: bool) -> Outlined:
-        """A layer that covers so many pixels wrongly."""
-        return Outlined(layer, self.overlay, off / self.edge, off / self._size, bitten, self.soft)
+    def _judged(self, layer: Group, wrong: torch.Tensor, bitten: bool) -> Outlined:
+        """A layer that covers points wrongly by so much [P]."""
+        off, (nearest, lengths) = float(wrong.sum()), self.sides
+        worst = float((wrong.new_zeros(len(lengths)).index_add_(0, nearest, wrong) / lengths).max())
+        return Outlined(layer, self.overlay, off / self.edge, worst, off / self._size, bitten, self.soft)
 
     @property
     def _size(self) -> float:

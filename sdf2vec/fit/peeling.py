@@ -83,7 +83,8 @@ class Outlines:
     def topmost(self, regions: Regions) -> list[Outlined]:
         """The layer that lies on top of some regions, of plain ones all that are no neighbours; none if none is told.
 
-        Another shape where one is bitten is the likelier: bites wait until there is nothing else.
+        Another shape where one is bitten is the likelier, or where a hole is not of the form that was cut out: these
+        wait until there is nothing else.
         """
         good = self._good(overlays(regions), regions)
         top = [
@@ -91,7 +92,7 @@ class Outlines:
         ]
         found = top or good
         for whole in (True, False):
-            if all(each.bitten for each in found):
+            if all(each.is_unlikely for each in found):
                 found += self._good(opaque(regions, self.scene.background.numpy(), whole), regions)
         if not found:
             found = self._good(holes(regions, self.scene.background.numpy()), regions)
@@ -104,7 +105,7 @@ class Outlines:
         corners, ground = cornered(regions), self.scene.background.numpy()[: regions.colors.shape[1]]
         if not corners.any() or _of_color(regions, ground)[corners].any():
             return None
-        told = self._told(Overlay(1.0, ground, ~corners, corners), regions)
+        told = self.told(Overlay(1.0, ground, ~corners, corners), regions)
         return told if told is not None and told.is_plain and not told.soft else None
 
     @property
@@ -121,11 +122,11 @@ class Outlines:
         for overlay in tried:
             if self.are_hopeless:
                 break
-            best = self._told(overlay, regions)
+            best = self.told(overlay, regions)
             found += [best] if best is not None else []
         return found
 
-    def _told(self, overlay: Overlay, regions: Regions) -> Outlined | None:
+    def told(self, overlay: Overlay, regions: Regions) -> Outlined | None:
         """What has the outline of an overlay; looked for in all of the picture where that hides what is not seen around
         its own place.
         """

@@ -48,10 +48,9 @@ def grounded(scene: SceneTensors, view: View, search: Search) -> SceneTensors:
     if plane.explains < EXPLAINED and plane.near.float().mean() < max(SHARE, MORE * flat):
         return scene
     ramp = _on_ramp(scene, plane, points, view, search)
-    is_one = plane.slopes.norm() * max(scene.size) > LEAST_CHANGE and _near(ramp, view) > max(
-        SHARE, MORE * flat
-    )
-    return ramp if is_one else scene
+    changes = plane.slopes.norm() * max(scene.size) > LEAST_CHANGE
+    explained = _near(ramp, view, _between(ramp.groups[0], points))
+    return ramp if changes and explained > max(SHARE, MORE * flat) else scene
 
 
 def lowest(scene: SceneTensors) -> int:
@@ -82,9 +81,20 @@ def _solved(rows: torch.Tensor, colors: torch.Tensor) -> torch.Tensor:
     return found
 
 
-def _near(scene: SceneTensors, view: View) -> float:
-    """The share of the pixels that are near to a scene's."""
-    return float((_wrong(scene, view) < NEAR).float().mean())
+def _near(scene: SceneTensors, view: View, where: torch.Tensor | None = None) -> float:
+    """The share of the pixels that are near to a scene's, of some [P] only, if they are given."""
+    near = (_wrong(scene, view) < NEAR).flatten()
+    return float((near if where is None else near & where).float().mean())
+
+
+def _between(layer: Group, points: Points) -> torch.Tensor:
+    """Where the colour of a box that is not turned changes [P]: beyond its ends there are two flat colours."""
+    center, half, direction, shift = (
+        next(value[0] for slot, value in layer.values.items() if slot.parameter.name == name)
+        for name in ("center", "half_size", "direction", "shift")
+    )
+    share = 0.5 + shift + (torch.stack(points[:2], dim=1) - center) / half @ direction
+    return (share > 0.0) & (share < 1.0)
 
 
 @torch.no_grad()

@@ -49,6 +49,23 @@ def test_the_gradient_of_a_ground_counts_as_a_shape(shapes, shaded):
     assert quality(scene, picture).psnr >= 38
 
 
+def test_stripes_are_no_gradient(drawn):
+    """A steep one between two stripes would have their colours."""
+    stripes = (
+        '<rect width="128" height="128" fill="#0057a8"/><rect x="30" width="98" height="128" fill="#f4f100"/>'
+    )
+    discs = "".join(
+        f'<circle cx="{x}" cy="{y}" r="9" fill="#199a00"/>' for x, y in ((52, 50), (77, 50), (64, 70))
+    )
+    picture = drawn(f'{stripes}<rect x="98" width="30" height="128" fill="#199a00"/>{discs}', SIDE, SIDE)
+    scene = fit(picture)
+    assert set(paints_of(scene)) == {"flat"}
+    assert (
+        sorted(shape.kind for layer in scene.layers for shape in layer.shapes) == ["box"] * 2 + ["circle"] * 3
+    )
+    assert quality(scene, picture).psnr >= 40
+
+
 def test_what_a_user_does_not_allow_has_no_part_in_it(shaded):
     scene = fit(shaded(GROUND + DISCS), kind="circle", max_shapes=8)
     assert {shape.kind for layer in scene.layers for shape in layer.shapes} <= {"circle"}

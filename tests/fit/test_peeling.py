@@ -314,6 +314,21 @@ def test_a_hole_of_another_shape_is_seen_where_the_picture_is_large():
     assert peeled(bare(), sizes, search_of()).layer_count == 0
 
 
+def test_a_hole_of_another_shape_makes_a_plate_unlikely():
+    """A box cut out for a diamond is off by little of all the edge, but not of the hole's."""
+    x, y = points()
+    diamond = abs(x - 48) / 13 + abs(y - 44) / 17 < 1
+    for hole, is_one, kind in ((diamond, False, "box"), (disc(48, 44, 14), True, "circle")):
+        pixels = painted((box(6, 4, 90, 92), BLUE, 1.0), (hole, GREEN, 1.0))
+        regions, around = Regions.of(pixels), Surroundings.of(bare(), 0, view_of(pixels))
+        plate = next(peeling.opaque(regions, WHITE, True))
+        told = peeling.Outlines(bare(), [around], search_of()).told(plate, regions)
+        assert told is not None
+        assert [part.kind for part in told.layer.structure] == ["box", kind]
+        assert told.is_good
+        assert told.is_unlikely is not is_one
+
+
 def sector(first, last, radius, hole=0):
     """Part of a disc or of a ring in the middle, between two directions in degrees."""
     x, y = points()
