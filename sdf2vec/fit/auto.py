@@ -60,6 +60,7 @@ LAST_ROUNDS, SLOW, SEVERAL = 3, 10**-0.2, 16
 GROWN = 1.5  # times the layers that could be told by their outlines, where these are not most of the drawing
 UNLIKELY = 1.5  # of the most shapes: a picture that needs more is no drawing
 SOFT_MOST = 16  # shapes of a soft drawing
+SAMPLES = 4  # across a pixel, of a drawing that is antialiased
 GOOD = 10**-3.5  # mean squared error, 35 dB, of what is surely found
 FAR = 10**-2.5  # 25 dB, of what is not yet the picture
 DOMINANT = 0.15  # share of the most common colour, of a picture that has a ground
@@ -291,13 +292,15 @@ class Drawing:
                 self.sizes, self.search = fine_enough(self.sizes, self.search, self.scene)
             outlined, helped = self.scene.layer_count, []
             rounds = grow(self.scene, self.sizes, self.search, self.settings.most, self.floor)
-            for made in rounds:
+            for made in () if self._is_told() else rounds:
                 if self._is_no_drawing(made):
                     self.gave_up = not self._was_good(made)
                     break
                 self.scene = made.scene
                 helped.append(made)
-                if self._has_met(self.scene) or self._are_slow(helped[-LAST_ROUNDS:], outlined):
+                if self._has_met(self.scene) or self._is_told():
+                    break
+                if self._are_slow(helped[-LAST_ROUNDS:], outlined):
                     break
             if not self.gave_up:
                 self._finish_as_wanted()
@@ -338,6 +341,13 @@ class Drawing:
         if self.settings.target_flip is None:
             return False
         return missed(self._scene_of(scene), self.picture, self.settings) <= 0
+
+    def _is_told(self) -> bool:
+        """Whether nothing is missing but how edges are antialiased, of which a small picture is much."""
+        wants = self.settings.target_psnr, self.settings.target_flip
+        if not self.scene.groups or self.settings.shapes != AUTO or wants != (None, None):
+            return False
+        return error_of(self.scene, self.sizes.joint, SAMPLES) <= self.floor
 
     def _finish_as_wanted(self) -> None:
         """Finishes the scene. A FLIP that it has reached is kept, by no more layers than that takes."""

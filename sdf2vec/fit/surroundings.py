@@ -37,27 +37,30 @@ def points_of(scene: SceneTensors, view: View) -> Points:
     return x, y, pixel
 
 
-def residual_of(scene: SceneTensors, view: View) -> torch.Tensor:
-    """How far a scene is from a picture, weighted, [C, H, W]; differentiable."""
-    wrong = _drawn(scene, view) - view.target
+def residual_of(scene: SceneTensors, view: View, samples: int = 1) -> torch.Tensor:
+    """How far a scene is from a picture, weighted, [C, H, W]; differentiable. Of more `samples` across a pixel the mean
+    is seen: as drawings are antialiased.
+    """
+    wrong = _drawn(scene, view, samples) - view.target
     return wrong if view.weights is None else wrong * view.weights
 
 
-def _drawn(scene: SceneTensors, view: View) -> torch.Tensor:
+def _drawn(scene: SceneTensors, view: View, samples: int = 1) -> torch.Tensor:
     """A scene at the size of a picture and with its channels, [C, H, W]; differentiable."""
     channels, height, width = view.target.shape
-    return fused.composite(scene, width, height, channels)
+    drawn = fused.composite(scene, samples * width, samples * height, channels)
+    return drawn if samples == 1 else torch.nn.functional.avg_pool2d(drawn, samples)
 
 
 @torch.no_grad()
-def error_of(scene: SceneTensors, view: View) -> float:
+def error_of(scene: SceneTensors, view: View, samples: int = 1) -> float:
     """The weighted mean squared error of a scene."""
-    return float(squared_error(scene, view))
+    return float(squared_error(scene, view, samples))
 
 
-def squared_error(scene: SceneTensors, view: View) -> torch.Tensor:
+def squared_error(scene: SceneTensors, view: View, samples: int = 1) -> torch.Tensor:
     """The same, differentiable."""
-    return residual_of(scene, view).square().mean()
+    return residual_of(scene, view, samples).square().mean()
 
 
 def some(scene: SceneTensors, which: Callable[[torch.Tensor], torch.Tensor]) -> SceneTensors:

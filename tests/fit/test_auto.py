@@ -60,6 +60,16 @@ def test_the_shapes_of_a_drawing_are_found(drawn, shapes, kinds):
     assert found.met
 
 
+def test_a_small_picture_is_told_where_nothing_but_edges_is_off(drawn):
+    """Two bars on a tile: 39 dB by the coverage of soft edges, which more shapes would mend."""
+    tile = '<rect y="8" width="64" height="48" rx="8" fill="#1c3d5a"/>'
+    bars = "".join(f'<rect x="{x}" y="20" width="10" height="24" rx="5" fill="white"/>' for x in (20, 34))
+    picture = drawn(WHITE + tile + bars, 64, 64)
+    found = fitted(picture)
+    assert found.scene.shape_count == 3
+    assert 38 < quality(found.scene, picture).psnr < 42
+
+
 def test_what_is_found_is_as_simple_as_drawn(drawn):
     """A sharp, opaque, upright box says so in its numbers, which `svg` writes as a plain rectangle."""
     scene = fit(drawn(WHITE + OVER))
