@@ -83,7 +83,7 @@ class Numbering:
     parts: tuple[Part, ...]
     scales: Scales
     bits: Bits
-    version: int = VERSION
+    version: int
 
     @classmethod
     def of(cls, scene: Scene, bits: Bits) -> Numbering:

@@ -126,7 +126,7 @@ def _record(parameters: tuple[Parameter, ...]) -> type[msgspec.Struct]:
         least = Meta(gt=low) if parameter.positive else Meta(ge=low)
         number = Annotated[float, least, Meta(le=high)]
         hint: Any = number if parameter.width == 1 else tuple[(number,) * parameter.width]  # type: ignore[misc]
-        default = [parameter.values_from(parameter.start)] if parameter.optional else []
+        default = [parameter.usual] if parameter.optional else []
         fields.append((parameter.name, hint, *default))
     return msgspec.defstruct("Numbers", fields, kw_only=True)
 

@@ -87,9 +87,8 @@ def _words(part: Part) -> dict[str, str]:
 
 def _told(parameters: tuple[Parameter, ...], rest: Iterator[float]) -> dict[str, Any]:
     """What a file says of some parameters, whose numbers come next in a row."""
-    usual = {p.name: p.values_from(p.start) for p in parameters if p.optional}
-    values = named(parameters, rest).items()
-    return {name: value for name, value in values if name not in usual or value != usual[name]}
+    values = named(parameters, rest)
+    return {p.name: values[p.name] for p in parameters if not p.optional or values[p.name] != p.usual}
 
 
 def _json(value: Any) -> str:

@@ -132,9 +132,9 @@ class Unit:
 class Parameter:
     """One parameter of a shape, a paint or a layer.
 
-    `start` is the value for a shape of size 1 at the origin: what `unit.start` takes; and if it is `optional`, the
-    value where a file has none. The unit's least value is excluded where it is `positive`. Compact files have it from
-    the version `since` on.
+    `start` is the value for a shape of size 1 at the origin: what `unit.start` takes. A file need not have it if it
+    is `optional`, and compact files do from the version `since` on. The unit's least value is excluded where it is
+    `positive`.
     """
 
     name: str
@@ -152,6 +152,11 @@ class Parameter:
     @property
     def type(self) -> Type:
         return VECTOR[self.width]
+
+    @property
+    def usual(self) -> float | tuple[float, ...]:
+        """Its value where it is optional and a file has none."""
+        return self.values_from(self.start)
 
     def variable(self, suffix: str = "") -> Expr:
         """A variable of its name."""

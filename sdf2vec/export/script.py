@@ -71,7 +71,7 @@ def script_parts(forms: Sequence[Form], own: bool = False) -> dict[str, object]:
 
 def _told(parameter: Parameter) -> dict[str, object]:
     """What a script must know of a parameter to check the numbers of a file."""
-    usual = {"usual": parameter.values_from(parameter.start)} if parameter.optional else {}
+    usual = {"usual": parameter.usual} if parameter.optional else {}
     light = {"light": True} if parameter.unit in (COLOR, OPACITY) else {}
     return {"name": parameter.name} | _needed(parameter) | light | usual
 

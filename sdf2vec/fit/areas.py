@@ -12,7 +12,7 @@ import torch
 from scipy import ndimage
 from skimage.morphology import convex_hull_image
 
-from ..arrays import Float64Array
+from ..arrays import BoolArray, Float64Array
 from ..blend import INTERSECTION, SUBTRACTION, UNION
 from ..layer import LOOK, Slot, row_width
 from ..paints import FLAT
@@ -138,10 +138,16 @@ class Area:
         """What its outline follows from."""
         return *self.name, self.known.numpy().tobytes()
 
+    @cached_property
+    def planes(self) -> tuple[BoolArray, BoolArray]:
+        """Which pixels [H, W] it has, and of which it is known."""
+        inside, known = (self.around.plane(mask > 0.5) for mask in (self.inside, self.known))
+        return inside, known
+
     @property
     def near(self) -> bytes:
         """What is known next to it and in its box."""
-        inside, known = (self.around.plane(mask > 0.5) for mask in (self.inside, self.known))
+        inside, known = self.planes
         rows, columns = (np.flatnonzero(inside.any(axis=axis)) for axis in (1, 0))
         if not len(rows):
             return b""
@@ -152,25 +158,24 @@ class Area:
     @cached_property
     def edge(self) -> float:
         """The length of its outline in pixels, where it is known."""
-        inside, known = (self.around.plane(mask > 0.5) for mask in (self.inside, self.known))
-        return float(max((inside & ndimage.binary_dilation(known & ~inside)).sum(), 1))
+        _, lengths = self.sides
+        return max(float(lengths.sum()), 1.0)
 
     @cached_property
     def sides(self) -> tuple[torch.Tensor, torch.Tensor]:
         """Which side of its outline is nearest to each point [P], the outer one or one around a hole; their lengths [S]
-        in pixels. Short ones are as good as none.
+        in pixels, where it is known.
         """
-        inside, known = (self.around.plane(mask > 0.5) for mask in (self.inside, self.known))
+        inside, known = self.planes
         parts, count = ndimage.label(known & ~inside, FULL)
-        if count == 0:
-            return torch.zeros(inside.size, dtype=torch.long), torch.tensor([self.edge])
+        beside = ndimage.maximum_filter(parts, footprint=ndimage.generate_binary_structure(2, 1))
+        lengths = torch.from_numpy(np.bincount(beside[inside], minlength=max(count, 1) + 1)[1:]).float()
+        if count < 2:
+            return torch.zeros(inside.size, dtype=torch.long), lengths
         rows, columns = ndimage.distance_transform_edt(
             parts == 0, return_distances=False, return_indices=True
         )
-        beside = ndimage.maximum_filter(parts, footprint=ndimage.generate_binary_structure(2, 1))
-        lengths = np.bincount(beside[inside], minlength=count + 1)[1:].astype(np.float32)
-        lengths[lengths < LEAST_SIDE] = np.inf
-        return torch.from_numpy(parts[rows, columns].ravel() - 1).long(), torch.from_numpy(lengths)
+        return torch.from_numpy(parts[rows, columns].ravel() - 1).long(), lengths
 
     @cached_property
     def coverage(self) -> Float64Array:
@@ -211,7 +216,8 @@ class Area:
     def _judged(self, layer: Group, wrong: torch.Tensor, bitten: bool) -> Outlined:
         """A layer that covers points wrongly by so much [P]."""
         off, (nearest, lengths) = float(wrong.sum()), self.sides
-        worst = float((wrong.new_zeros(len(lengths)).index_add_(0, nearest, wrong) / lengths).max())
+        long = lengths.where(lengths >= LEAST_SIDE, math.inf)  # of short ones the mean says little
+        worst = float((wrong.new_zeros(len(lengths)).index_add_(0, nearest, wrong) / long).max())
         return Outlined(layer, self.overlay, off / self.edge, worst, off / self._size, bitten, self.soft)
 
     @property

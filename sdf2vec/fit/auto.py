@@ -298,9 +298,8 @@ class Drawing:
                     break
                 self.scene = made.scene
                 helped.append(made)
-                if self._has_met(self.scene) or self._is_told():
-                    break
-                if self._are_slow(helped[-LAST_ROUNDS:], outlined):
+                is_enough = self._has_met(self.scene) or self._is_told()
+                if is_enough or self._are_slow(helped[-LAST_ROUNDS:], outlined):
                     break
             if not self.gave_up:
                 self._finish_as_wanted()
@@ -344,8 +343,7 @@ class Drawing:
 
     def _is_told(self) -> bool:
         """Whether nothing is missing but how edges are antialiased, of which a small picture is much."""
-        wants = self.settings.target_psnr, self.settings.target_flip
-        if not self.scene.groups or self.settings.shapes != AUTO or wants != (None, None):
+        if not self.scene.groups or self.settings.shapes != AUTO or _has_target(self.settings):
             return False
         return error_of(self.scene, self.sizes.joint, SAMPLES) <= self.floor
 

@@ -89,11 +89,12 @@ def _near(scene: SceneTensors, view: View, where: torch.Tensor | None = None) ->
 
 def _between(layer: Group, points: Points) -> torch.Tensor:
     """Where the colour of a box that is not turned changes [P]: beyond its ends there are two flat colours."""
-    center, half, direction, shift = (
-        next(value[0] for slot, value in layer.values.items() if slot.parameter.name == name)
-        for name in ("center", "half_size", "direction", "shift")
-    )
-    share = 0.5 + shift + (torch.stack(points[:2], dim=1) - center) / half @ direction
+    values = {slot.parameter.name: value[0] for slot, value in layer.values.items()}
+    paint = PAINTS[PAINT]
+    assert paint.ramp is not None
+    ramp = paint.ramp(*(p.values_from(values[p.name].tolist()) for p in paint.parameters))
+    place = (torch.stack(points[:2], dim=1) - values["center"]) / values["half_size"]
+    share = ramp.middle + place @ torch.tensor(ramp.slope)
     return (share > 0.0) & (share < 1.0)
 
 

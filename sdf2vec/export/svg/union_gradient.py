@@ -64,10 +64,10 @@ def ramp_of(shape: Shape, canvas: Canvas, lift: float = 0.0) -> LinearGradient |
     )  # along x and y of the scene
     steepness = float(slope @ slope)
     if steepness < FLAT:
-        share = min(max(ramp.middle, 0.0), 1.0)
-        return moved([a + share * (b - a) for a, b in zip(ramp.first, ramp.last, strict=True)], lift)
-    ends = frame.origin + np.outer((-ramp.middle, 1.0 - ramp.middle), slope / steepness)
-    start, end = pairs(canvas.places(ends))
+        ends = zip(ramp.first, ramp.last, strict=True)
+        return moved([float(np.interp(ramp.middle, (0.0, 1.0), pair)) for pair in ends], lift)
+    places = frame.origin + np.outer((-ramp.middle, 1.0 - ramp.middle), slope / steepness)
+    start, end = pairs(canvas.places(places))
     return LinearGradient(start, end, (Stop(0.0, moved(ramp.first, lift)), Stop(1.0, moved(ramp.last, lift))))
 
 
