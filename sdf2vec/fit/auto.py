@@ -60,7 +60,7 @@ LAST_ROUNDS, SLOW, SEVERAL = 3, 10**-0.2, 16
 GROWN = 1.5  # times the layers that could be told by their outlines, where these are not most of the drawing
 UNLIKELY = 1.5  # of the most shapes: a picture that needs more is no drawing
 SOFT_MOST = 16  # shapes of a soft drawing
-SAMPLES = 4  # across a pixel, of a drawing that is antialiased
+SAMPLES, SAMPLED = (4, 2), 400  # across a pixel; across a picture of which more than one are taken, at most
 GOOD = 10**-3.5  # mean squared error, 35 dB, of what is surely found
 FAR = 10**-2.5  # 25 dB, of what is not yet the picture
 DOMINANT = 0.15  # share of the most common colour, of a picture that has a ground
@@ -279,7 +279,7 @@ class Drawing:
         self.pixels, self.worst = drawn.wanted(settings.target_psnr)
         self.floor = self.worst if settings.target_psnr is not None else max(FLOOR, self.worst)
         self.good = self.floor if settings.target_psnr is not None else max(GOOD, self.worst)
-        self.sizes = Sizes(*(looked_at(self.pixels, settings, r) for r in (SEARCH, JOINT, LAST)))
+        self.sizes = Sizes(*(self._seen(resolution) for resolution in (SEARCH, JOINT, LAST)))
         self.scene = SceneTensors([], ground_of(self.sizes.joint.target), settings.compositing, self.size)
 
     def found(self) -> Scene:
@@ -292,14 +292,13 @@ class Drawing:
                 self.sizes, self.search = fine_enough(self.sizes, self.search, self.scene)
             outlined, helped = self.scene.layer_count, []
             rounds = grow(self.scene, self.sizes, self.search, self.settings.most, self.floor)
-            for made in () if self._is_told() else rounds:
+            for made in rounds:
                 if self._is_no_drawing(made):
                     self.gave_up = not self._was_good(made)
                     break
                 self.scene = made.scene
                 helped.append(made)
-                is_enough = self._has_met(self.scene) or self._is_told()
-                if is_enough or self._are_slow(helped[-LAST_ROUNDS:], outlined):
+                if self._has_met(self.scene) or self._are_slow(helped[-LAST_ROUNDS:], outlined):
                     break
             if not self.gave_up:
                 self._finish_as_wanted()
@@ -341,11 +340,15 @@ class Drawing:
             return False
         return missed(self._scene_of(scene), self.picture, self.settings) <= 0
 
-    def _is_told(self) -> bool:
-        """Whether nothing is missing but how edges are antialiased, of which a small picture is much."""
-        if not self.scene.groups or self.settings.shapes != AUTO or _has_target(self.settings):
-            return False
-        return error_of(self.scene, self.sizes.joint, SAMPLES) <= self.floor
+    def _seen(self, resolution: int) -> View:
+        """The pixels at a resolution; of a small picture, of which edges are most, as they are antialiased, but where
+        it is said how near shapes are to come: that is measured as the renderer draws them.
+        """
+        view = looked_at(self.pixels, self.settings, resolution)
+        height, width, _ = self.pixels.shape
+        if _has_target(self.settings) or view.target.shape[1:] != (height, width):
+            return view
+        return view._replace(samples=next((n for n in SAMPLES if n * max(height, width) <= SAMPLED), 1))
 
     def _finish_as_wanted(self) -> None:
         """Finishes the scene. A FLIP that it has reached is kept, by no more layers than that takes."""

@@ -65,12 +65,16 @@ class SceneProblem:
     def __init__(self, scene: SceneTensors, view: View) -> None:
         self.scene, self.view = scene, view
         self.channels, height, width = view.target.shape
+        height, width = view.samples * height, view.samples * width
         rows, columns = -(-height // TILE), -(-width // TILE)
         x, y, pixel = canvas_axes(scene.size, columns * TILE, rows * TILE, width, height)
         self.pixel = float(pixel)
-        weights = torch.ones(height, width) if view.weights is None else view.weights
+        weights = torch.ones(view.target.shape[1:]) if view.weights is None else view.weights
         beyond = ((0, 0), (0, rows * TILE - height), (0, columns * TILE - width))
-        target, matter = (np.pad(each.numpy(), beyond) for each in (view.target, weights[None]))
+        target, matter = (
+            np.pad(each.numpy().repeat(view.samples, 1).repeat(view.samples, 2), beyond)
+            for each in (view.target, weights[None])
+        )
         planes = np.concatenate([np.stack(np.broadcast_arrays(x, y[:, None])), matter, target])
         tiled = _tiled(planes)
         self.pixels = tiled[0], tiled[1], np.ascontiguousarray(tiled[3:].swapaxes(0, 1)), tiled[2]
@@ -116,7 +120,7 @@ class SceneProblem:
         """The normal equations by the free numbers."""
         scene = self.scene_of(rows)
         _, height, width = self.view.target.shape
-        bins = fused.bins_of(scene, width, height)
+        bins = fused.bins_of(scene, self.view.samples * width, self.view.samples * height)
         order, kinds, packed = fused.drawn_rows(scene, self.pixel)
         most = int(np.diff(bins.starts).max(initial=1))
         total = int(self.offsets[-1]) + self.channels
@@ -129,6 +133,7 @@ class SceneProblem:
             bins.layers,
             *self.pixels,
             scene.background.numpy(),
+            self.view.samples,
             *self._scratch(max(most, 1)),
             normal,
             right,

@@ -6,7 +6,7 @@ structure (`laying.entries`) and called by their addresses.
 
 from ..kernel_cache import kernel
 from ..lower.loops import F32, F64, I32, I64, ZERO, call, f32, inlined
-from ..render.tiling import PIXELS
+from ..render.tiling import PIXELS, TILE
 
 LEAST_SLOPE = f32(1e-12)  # squared: what is less changes nothing
 
@@ -71,6 +71,32 @@ def list_active(layers, widths, offsets, channels, sloped, active):
     return count
 
 
+@inlined
+def pool(plane, samples):
+    """Puts the mean of each pixel's samples in a tile in the place of the first, and nothing in those of the others."""
+    share = f32(1.0) / f32(samples * samples)
+    for top in range(0, TILE, samples):
+        for left in range(0, TILE, samples):
+            total = ZERO
+            for down in range(samples):
+                for right in range(samples):
+                    place = (top + down) * TILE + left + right
+                    total += plane[place]
+                    plane[place] = ZERO
+            plane[top * TILE + left] = total * share
+
+
+@inlined
+def pool_all(wrong, light, slopes, active, count, samples):
+    """The same with what is wrong, and the derivatives by the ground and by all numbers that change a tile."""
+    if samples > 1:
+        for c in range(wrong.shape[0]):
+            pool(wrong[c], samples)
+            pool(light[c], samples)
+            for f in range(count):
+                pool(slopes[active[1, f], active[3, f] + c * active[2, f]], samples)
+
+
 @kernel
 def add_scene_products(
     first: I64,
@@ -87,6 +113,7 @@ def add_scene_products(
     target: F32[3],
     weights: F32[2],
     ground: F32[1],
+    samples: I64,
     below: F32[4],
     sloped: F32[4],
     active: I64[3],
@@ -120,6 +147,7 @@ def add_scene_products(
             active[first, 3],
         )
         count = list_active(own, widths, offsets, channels, slopes, active[first])
+        pool_all(wrong, light, slopes, active[first], count, samples)
         for c in range(channels):
             for f in range(count):
                 slope = slopes[places[f], planes[f] + c * breadths[f]]

@@ -25,10 +25,13 @@ SEEN = 0.2  # of what is below, at least, where its colour is told from what is 
 
 
 class View(NamedTuple):
-    """A picture at some size: premultiplied [C, H, W], and how much an error matters there [H, W], or None."""
+    """A picture at some size: premultiplied [C, H, W], how much an error matters there [H, W], or None, and of how many
+    samples across each pixel is the mean: the more, the more as drawings are antialiased.
+    """
 
     target: torch.Tensor
     weights: torch.Tensor | None
+    samples: int = 1
 
 
 def points_of(scene: SceneTensors, view: View) -> Points:
@@ -37,30 +40,28 @@ def points_of(scene: SceneTensors, view: View) -> Points:
     return x, y, pixel
 
 
-def residual_of(scene: SceneTensors, view: View, samples: int = 1) -> torch.Tensor:
-    """How far a scene is from a picture, weighted, [C, H, W]; differentiable. Of more `samples` across a pixel the mean
-    is seen: as drawings are antialiased.
-    """
-    wrong = _drawn(scene, view, samples) - view.target
+def residual_of(scene: SceneTensors, view: View) -> torch.Tensor:
+    """How far a scene is from a picture, weighted, [C, H, W]; differentiable."""
+    wrong = _drawn(scene, view) - view.target
     return wrong if view.weights is None else wrong * view.weights
 
 
-def _drawn(scene: SceneTensors, view: View, samples: int = 1) -> torch.Tensor:
+def _drawn(scene: SceneTensors, view: View) -> torch.Tensor:
     """A scene at the size of a picture and with its channels, [C, H, W]; differentiable."""
-    channels, height, width = view.target.shape
+    (channels, height, width), samples = view.target.shape, view.samples
     drawn = fused.composite(scene, samples * width, samples * height, channels)
     return drawn if samples == 1 else torch.nn.functional.avg_pool2d(drawn, samples)
 
 
 @torch.no_grad()
-def error_of(scene: SceneTensors, view: View, samples: int = 1) -> float:
+def error_of(scene: SceneTensors, view: View) -> float:
     """The weighted mean squared error of a scene."""
-    return float(squared_error(scene, view, samples))
+    return float(squared_error(scene, view))
 
 
-def squared_error(scene: SceneTensors, view: View, samples: int = 1) -> torch.Tensor:
+def squared_error(scene: SceneTensors, view: View) -> torch.Tensor:
     """The same, differentiable."""
-    return residual_of(scene, view, samples).square().mean()
+    return residual_of(scene, view).square().mean()
 
 
 def some(scene: SceneTensors, which: Callable[[torch.Tensor], torch.Tensor]) -> SceneTensors:

@@ -10,7 +10,7 @@ import torch
 from PIL import Image, ImageDraw
 from skimage import data
 
-from sdf2vec import Scene, Sdf2vecError, fit, fitted
+from sdf2vec import Scene, Sdf2vecError, fit, fitted, render
 from sdf2vec.bench.known_scenes import known_scene
 from sdf2vec.fit import auto
 from sdf2vec.fit.auto import ground_of
@@ -68,6 +68,8 @@ def test_a_small_picture_is_told_where_nothing_but_edges_is_off(drawn):
     found = fitted(picture)
     assert found.scene.shape_count == 3
     assert 38 < quality(found.scene, picture).psnr < 42
+    fine = render(found.scene, 8 * 64, 8 * 64).reshape(64, 8, 64, 8, 3).mean(axis=(1, 3))
+    assert -10 * np.log10(np.mean((fine - picture.pixels) ** 2)) > 46  # their edges are where they were drawn
 
 
 def test_what_is_found_is_as_simple_as_drawn(drawn):

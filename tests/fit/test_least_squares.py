@@ -39,23 +39,24 @@ def scene_of(*layers: Layer, compositing: str = "over", dtype=torch.float32) -> 
 
 
 @pytest.mark.parametrize("compositing", ["over", "additive"])
-@pytest.mark.parametrize("channels", [3, 4])
-def test_normal_equations_are_those_of_finite_differences(compositing, channels):
-    """In float64, by the reference renderer."""
+@pytest.mark.parametrize(("channels", "samples"), [(3, 1), (4, 1), (3, 2), (4, 4)])
+def test_normal_equations_are_those_of_finite_differences(compositing, channels, samples):
+    """In float64, by the reference renderer; of more samples across a pixel the mean is seen."""
     layers = DISC, RING, DISC, RAMP
     draw = torch.Generator().manual_seed(1)
     target = torch.rand(channels, HEIGHT, WIDTH, generator=draw)
     weights = torch.rand(HEIGHT, WIDTH, generator=draw)
-    problem = SceneProblem(scene_of(*layers, compositing=compositing), View(target, weights))
+    problem = SceneProblem(scene_of(*layers, compositing=compositing), View(target, weights, samples))
     row = problem.row()
     free = np.array([n for n in range(row.shape[1] - 1) if n != 2])
     precise = scene_of(*layers, compositing=compositing, dtype=torch.float64)
 
     def wrong(moved):
         made = problem.scene_of(moved[None])
-        x, y, pixel = canvas(precise, WIDTH, HEIGHT)
+        x, y, pixel = canvas(precise, samples * WIDTH, samples * HEIGHT)
         drawn = composite_points(made, x, y, pixel)[:channels]
-        return ((drawn - target.flatten(1)) * weights.flatten()).flatten()
+        seen = drawn.view(channels, HEIGHT, samples, WIDTH, samples).mean((2, 4))
+        return ((seen - target) * weights).flatten()
 
     here = SceneProblem(precise, problem.view).row()[0]
     steps = 1e-6 * torch.eye(len(here), dtype=torch.float64)[free]
