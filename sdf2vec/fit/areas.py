@@ -64,7 +64,7 @@ class Outlined:
 
     def priced(self, least: float, price: float) -> float:
         """The same where it is no better that an outline is off by less than the least, and each number has a price."""
-        return math.log(max(self.off, least)) + price * row_width(self.layer.structure)
+        return math.log(max(self.off, self.worst, least)) + price * row_width(self.layer.structure)
 
     @property
     def is_good(self) -> bool:

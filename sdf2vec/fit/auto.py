@@ -383,7 +383,7 @@ class Drawing:
         if worst or few:
             hope = THOROUGH if few else USUAL
             self.scene = pruned(self.scene, sizes, search, self.floor, hope)
-        self.scene = simplified(self.scene, sizes.joint, search, worst)
+        self.scene = simplified(self.scene, sizes.joint._replace(samples=1), search, worst)
         self.scene = sharper(finished(self.scene, sizes, search), sizes, search, FLOOR)
         self.scene = self._briefer(self.floor)
         self.scene = sharing(lined(self.scene, sizes.last, search, worst), sizes.last, worst)

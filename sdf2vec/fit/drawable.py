@@ -40,6 +40,7 @@ BLURRED = (  # of layers that are blurred in runs, no longer each by its falloff
 FINE = (256, 320, 384)  # pixels squared, of these phases, where a run needs them
 FINER = 1.3  # pixels: one of a smaller standard deviation does
 GROWTH = 1.1  # of a triangle's spread, where its edge moves outwards
+TRIANGLES = ("triangle", "rounded_triangle")
 # what a shape is larger by; others have corners
 GROWING = ("radius", "radii", "half_size", "corner_radius", "half_width")
 TINY = 1e-12
@@ -214,7 +215,7 @@ def _unfold(group: Group, grain: Grain, kept: Kept) -> None:
     """Moves a corner of triangles that have become one upright or level line, of which renderers draw no blur, or
     none with an area, which are not seen without one.
     """
-    if len(group.structure) > 1 or group.structure[0].kind != "triangle":
+    if len(group.structure) > 1 or group.structure[0].kind not in TRIANGLES:
         return
     a, b, c = (values for slot, values in kept.items() if slot.parameter.unit is POSITION)
     step = 1.0 / grain.units

@@ -20,7 +20,7 @@ from ..render.tensors import Group, SceneTensors
 from ..shapes import KINDS
 from ..units import FALLOFF, SMOOTHNESS
 from .adam import rate_of
-from .candidates import Opening, Proposer, Tried, alone, openings, reductions
+from .candidates import ROUNDED, Opening, Proposer, Tried, alone, openings, reductions
 from .constraints import ranges_of, room_of
 from .initialization import Layers, straight
 from .levenberg import Numbers, Tick
@@ -275,11 +275,15 @@ class Search:
         """What single shapes may be."""
         return tuple(kind for kind in self.layers.kinds if KINDS[kind].patch is None)
 
-    def proposer(self, around: Surroundings) -> Proposer:
-        """What fits single shapes to masks."""
+    def outliner(self, around: Surroundings) -> Proposer:
+        """What fits single shapes to masks of which the whole outline is known."""
         return Proposer(
             self.kinds, self.layers.paint, self.generator, partial(self.numbers, around), self.tick
         )
+
+    def proposer(self, around: Surroundings) -> Proposer:
+        """The same of any: where little is known triangles with round corners are as near as any, but take more."""
+        return self.outliner(around).without(ROUNDED)
 
     def _color(self, around: Surroundings) -> torch.Tensor:
         """The mean colour [1, 3] of what a layer should show."""

@@ -13,7 +13,7 @@ from ..layer import Structure
 from ..render.tensors import Group
 from .arcs import Arc
 from .areas import CIRCLE, EXACT, LEAST_OFF, Area, Outlined
-from .candidates import ARC, Opening, Proposer, joined_sharply, reductions
+from .candidates import ARC, ROUNDED, Opening, Proposer, joined_sharply, reductions
 from .covering import Covering
 from .joining import Search
 from .stroking import stroked
@@ -34,10 +34,11 @@ def best_outlined(area: Area, fine: Area, search: Search) -> Outlined | None:
     """The best that shapes of all kinds come to, of those that are good what is so in the finest surroundings, too;
     None where there is less than a pixel.
     """
-    proposer = search.proposer(area.around).without(ARC)  # of which ends are round: strokes tell, or the rest
-    plain = _single(area, area.opening(), proposer) if area.inside.max() > 0.5 else []
+    outliner = search.outliner(area.around).without(ARC)  # of which ends are round: strokes tell, or the rest
+    plain = _single(area, area.opening(), outliner) if area.inside.max() > 0.5 else []
     if not plain:
         return None
+    proposer = outliner.without(ROUNDED)
     ranked = _sharpest(plain, area, proposer)
 
     def finely(each: Outlined) -> float:
@@ -54,7 +55,7 @@ def best_outlined(area: Area, fine: Area, search: Search) -> Outlined | None:
     cut = [
         area.outlined(tried.layer)
         for base in _distinct(wide)[:BASES]
-        for tried in proposer.candidates([area.cut(base.layer)], area.around)[0]
+        for tried in outliner.candidates([area.cut(base.layer)], area.around)[0]
     ]
     best = _sharpest([best, *cut], area, proposer)[0]
     if area.overlay.opacity < 1.0:

@@ -12,11 +12,11 @@ from ..render.tensors import Group, SceneTensors
 from .candidates import ARC
 from .covering import BOX
 from .joining import Search, detached, inserted
-from .least_squares import is_simple
+from .least_squares import improved, is_simple
 from .simplify import UNSEEN, with_part
 from .surroundings import Surroundings, View, error_of, layer_at
 
-STEPS = 10  # of a box whose corners have become round
+STEPS, SETTLING = 10, 3  # of a box whose corners have become round; of all after it
 LONG = 1.5  # times as long as wide
 ALIKE, SAME = 0.06, 1e-4  # logarithm of what widths of one pen differ by; of what they do when they are one
 AS_GOOD = 1.1  # times the mean squared error, at most
@@ -32,11 +32,9 @@ def lined(scene: SceneTensors, view: View, search: Search, worst: float) -> Scen
     limit = max(worst, AS_GOOD * error, error + 4.0 * UNSEEN)
     layers = [layer_at(scene, order) for order in range(scene.layer_count)]
     for layer in sorted((each for each in layers if _is_long_box(each)), key=_has_corners):
-        around = Surroundings.of(scene, int(layer.order), view)
-        made = inserted(scene, _moved(_stroke_of(layer), around, search))
-        most = limit
+        made, most = _moved(scene, _stroke_of(layer), view, search), limit
         if _has_corners(layer) and not _has_pen(scene, layer):
-            most = error_of(inserted(scene, _moved(layer, around, search)), view) - UNSEEN
+            most = error_of(_moved(scene, layer, view, search), view) - UNSEEN
         scene = made if error_of(made, view) <= most else scene
     made = detached(scene)
     in_one_width(made.groups, made.groups, ALIKE)
@@ -76,11 +74,16 @@ def _stroke_of(box: Group) -> Group:
     return made.each(lambda tensor: tensor.detach().clone())
 
 
-def _moved(layer: Group, around: Surroundings, search: Search) -> Group:
-    """A layer nearer to what it should be, as straight as it is, or with the corners that it has."""
+def _moved(scene: SceneTensors, layer: Group, view: View, search: Search) -> SceneTensors:
+    """The scene with a layer nearer to what it should be, as straight as it is, or with the corners that it has.
+
+    Where pixels are means of samples all numbers move a little, too: a layer descends by the pixels' middles.
+    """
+    around = Surroundings.of(scene, int(layer.order), view)
     still = {slot for slot, v in layer.values.items() if v.numel() == 1 and is_simple(slot, float(v))}
     still |= {slot for slot in layer.values if slot.parameter.name == "corner_radius"}
-    return search.trained(layer, around, STEPS, lambda slot: slot not in still).layer
+    made = inserted(scene, search.trained(layer, around, STEPS, lambda slot: slot not in still).layer)
+    return made if view.samples == 1 else improved(made, view, search, SETTLING, simple=True)
 
 
 def is_stroke(group: Group) -> bool:

@@ -29,7 +29,8 @@ LARGEST_AREA = 0.1  # share of the canvas
 
 
 AUTO: Literal["auto"] = "auto"
-DRAWN = ("circle", "ellipse", "box", "triangle", "arc")  # what drawings are made of, unless kinds are given
+# what drawings are made of, unless kinds are given
+DRAWN = ("circle", "ellipse", "box", "triangle", "rounded_triangle", "arc")
 PAINTED = ("triangle",)  # what else is, unless kinds are given
 
 Shapes = (

@@ -14,13 +14,14 @@ import torch
 
 from ..expr import const
 from ..graph import scalarize
+from ..kind import SMALLEST
 from ..layer import JOIN, LOOK, Part, Slot, slots
 from ..lower.torch import Tensors, compile_torch
 from ..paints import BASE, FLAT
 from ..render.tensors import Group, SceneTensors
 from ..shapes import KINDS
 from ..units import ANGLE, COLOR
-from .candidates import joined_sharply, reductions
+from .candidates import ROUNDED, joined_sharply, reductions
 from .joining import Search, inserted
 from .surroundings import Surroundings, View, error_of, layer_at
 
@@ -134,6 +135,26 @@ def _circle(layer: Group, view: View) -> Iterator[Change]:
             )
 
 
+def _triangle(layer: Group, view: View) -> Iterator[Change]:
+    """A triangle with round corners as one with sharp corners whose sides lie where its sides do."""
+    for index, part in enumerate(layer.structure):
+        if part.kind == ROUNDED:
+            radius, corners = layer.of("corner_radius", index), [layer.of(name, index) for name in "abc"]
+            opposite = [
+                (corners[i - 1] - corners[i - 2]).norm(dim=1, keepdim=True).clamp_min(SMALLEST)
+                for i in range(3)
+            ]
+            around = torch.stack(opposite).sum(0)
+            middle = (
+                torch.stack([side * at for side, at in zip(opposite, corners, strict=True)]).sum(0) / around
+            )
+            one, other = corners[1] - corners[0], corners[2] - corners[0]
+            twice = (one[:, :1] * other[:, 1:] - one[:, 1:] * other[:, :1]).abs().clamp_min(SMALLEST * around)
+            grown = 1.0 + radius * around / twice  # of what lies around the middle of the circle within
+            sharp = {name: middle + grown * (at - middle) for name, at in zip("abc", corners, strict=True)}
+            yield with_part(layer, index, part._replace(kind="triangle"), sharp), ()
+
+
 def middle_of(layer: Group, index: int) -> tuple[torch.Tensor, torch.Tensor]:
     """Where a shape of a layer is [1, 2], and half the mean of its sides [1, 1]."""
     low_x, low_y, high_x, high_y = _extent(layer.structure[index].kind)(*layer.shape(index))
@@ -241,6 +262,7 @@ def _with(layer: Group, changed: Slot, value: float) -> Group:
 CHANGES: tuple[Propose, ...] = (
     _fewer_parts,
     _circle,
+    _triangle,
     _flat,
     _joined_sharply,
     _unrounded,

@@ -15,7 +15,7 @@ WHITE, BLUE, RED, GREEN = (
     np.array(c) for c in ((1, 1, 1), (0.1, 0.2, 0.8), (0.9, 0.1, 0.1), (0.2, 0.7, 0.3))
 )
 SIDE, FINER = 96, 4
-KINDS = ("circle", "ellipse", "box", "triangle", "arc")
+KINDS = ("circle", "ellipse", "box", "triangle", "rounded_triangle", "arc")
 # of a gradient: its colour in the middle, and how much it rises from side to side
 HALF, RISE = np.array([0.5, 0.3, 0.5]), np.array([0.4, 0.2, -0.4])
 

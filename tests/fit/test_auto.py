@@ -34,6 +34,7 @@ WHITE = '<rect width="100%" height="100%" fill="white"/>'
 DISC = '<circle cx="44" cy="50" r="24" fill="#d02040"/>'
 UNDER = '<circle cx="40" cy="40" r="22" fill="#2040d0"/>'
 OVER = '<rect x="38" y="44" width="40" height="30" fill="#10a050"/>'
+PLAY = '<path d="M30 26L70 48L30 70z" fill="#d02040" stroke="#d02040" stroke-width="14" stroke-linejoin="round"/>'
 TRIANGLE = '<polygon points="70,8 90,34 60,30" fill="#e0a010"/>'
 
 
@@ -47,9 +48,11 @@ def kinds_of(scene):
         ("", []),
         (WHITE, []),
         (WHITE + DISC, ["circle"]),
+        (WHITE + PLAY, ["rounded_triangle"]),
+        (WHITE + TRIANGLE, ["triangle"]),
         (DISC + OVER, ["box", "circle"]),
     ],
-    ids=["nothing", "a ground", "a disc", "on nothing, one partly hidden"],
+    ids=["nothing", "a ground", "a disc", "a play button", "a triangle", "on nothing, one partly hidden"],
 )
 def test_the_shapes_of_a_drawing_are_found(drawn, shapes, kinds):
     picture = drawn(shapes)

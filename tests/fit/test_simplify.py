@@ -1,9 +1,11 @@
 """What is drawn in fewer numbers is said in fewer: colours that are shared, one colour instead of a ramp."""
 
 import numpy as np
+import pytest
 import torch
 
 from sdf2vec import Scene, fit
+from sdf2vec.fit import simplify
 from sdf2vec.fit.auto import Drawing
 from sdf2vec.fit.drawings import Drawn
 from sdf2vec.fit.initialization import Layers
@@ -24,7 +26,11 @@ RED, ALMOST = (0.8, 0.1, 0.2), (0.802, 0.1, 0.199)
 def as_simple_as_drawn(scene, drawn, worst=0.0):
     view = View(draw(drawn)[:3], None)
     search = Search(
-        Layers(("circle", "box", "arc"), "over"), (0.0, 1.0), torch.Generator(), lambda loss: None, 1 / 48
+        Layers(("circle", "box", "triangle", "rounded_triangle", "arc"), "over"),
+        (0.0, 1.0),
+        torch.Generator(),
+        lambda loss: None,
+        1 / 48,
     )
     made = simplified(from_scene(scene), view, search, worst)
     return to_scene(sharing(made, view, worst), 48, 48)
@@ -64,6 +70,27 @@ def test_joins_that_are_seen_to_be_smooth_stay_so():
     joined = Scene(48, 48, (Layer(shapes, joints=(Joint("union", 0.06),)),), (1.0, 1.0, 1.0))
     (layer,) = as_simple_as_drawn(joined, joined).layers
     assert layer.joints[0].smoothness > 0.04
+
+
+def triangle(kind, a, b, c, **rest):
+    return scene(Shape.of(kind, RED, a=a, b=b, c=c, **rest))
+
+
+def test_a_triangle_whose_corners_are_hardly_round_has_sharp_ones():
+    """Sides of 0.6, 0.8 and 1, a circle of 0.2 within; those of the other lie a fiftieth farther in."""
+    wanted = triangle("triangle", (-0.32, -0.32), (0.48, -0.32), (-0.32, 0.28))
+    begun = triangle("rounded_triangle", (-0.3, -0.3), (0.42, -0.3), (-0.3, 0.24), corner_radius=0.02)
+    (layer,) = from_scene(begun).groups
+    ((sharp, _),) = simplify._triangle(layer, View(torch.zeros(3, 48, 48), None))
+    assert sharp.rows()[0, -6:].tolist() == pytest.approx((-0.32, -0.32, 0.48, -0.32, -0.32, 0.28), abs=1e-6)
+    (found,) = as_simple_as_drawn(begun, wanted, 1e-4).layers[0].shapes
+    assert found.kind == "triangle"
+
+
+def test_corners_that_are_seen_to_be_round_stay_so():
+    own = triangle("rounded_triangle", (-0.2, -0.2), (0.2, -0.2), (-0.2, 0.2), corner_radius=0.15)
+    (found,) = as_simple_as_drawn(own, own, 1e-6).layers[0].shapes
+    assert found.kind == "rounded_triangle"
 
 
 def arc(sagitta):

@@ -83,6 +83,7 @@ SHARP: dict[str, Parameters] = {
     "ellipse": {"center": (0.1, 0), "radii": (0.5, 0.2), "angle": 0.5},
     "box": {"center": (0.1, 0), "half_size": (0.5, 0.2), "angle": 0.5, "corner_radius": 0.1},
     "triangle": {"a": (0, -0.4), "b": (0.5, 0.3), "c": (-0.4, 0.2)},
+    "rounded_triangle": {"a": (0, -0.3), "b": (0.4, 0.2), "c": (-0.3, 0.1), "corner_radius": 0.1},
     "arc": {"a": (-0.3, -0.2), "b": (0.4, 0.1), "sagitta": 0.3, "half_width": 0.1},
     "displaced": {"center": (0, 0), "radius": 0.3, "amplitude": 0.1, "frequency": (12, 9)},
 }
