@@ -60,7 +60,8 @@ LAST_ROUNDS, SLOW, SEVERAL = 3, 10**-0.2, 16
 GROWN = 1.5  # times the layers that could be told by their outlines, where these are not most of the drawing
 UNLIKELY = 1.5  # of the most shapes: a picture that needs more is no drawing
 SOFT_MOST = 16  # shapes of a soft drawing
-SAMPLES, SAMPLED = (4, 2), 400  # across a pixel; across a picture of which more than one are taken, at most
+SAMPLES = 4  # across a pixel, of a drawing that is antialiased
+SMALL = 100  # pixels along the longer side of a picture that is looked at by these, at most
 GOOD = 10**-3.5  # mean squared error, 35 dB, of what is surely found
 FAR = 10**-2.5  # 25 dB, of what is not yet the picture
 DOMINANT = 0.15  # share of the most common colour, of a picture that has a ground
@@ -292,13 +293,14 @@ class Drawing:
                 self.sizes, self.search = fine_enough(self.sizes, self.search, self.scene)
             outlined, helped = self.scene.layer_count, []
             rounds = grow(self.scene, self.sizes, self.search, self.settings.most, self.floor)
-            for made in rounds:
+            for made in () if self._is_told() else rounds:
                 if self._is_no_drawing(made):
                     self.gave_up = not self._was_good(made)
                     break
                 self.scene = made.scene
                 helped.append(made)
-                if self._has_met(self.scene) or self._are_slow(helped[-LAST_ROUNDS:], outlined):
+                is_enough = self._has_met(self.scene) or self._is_told()
+                if is_enough or self._are_slow(helped[-LAST_ROUNDS:], outlined):
                     break
             if not self.gave_up:
                 self._finish_as_wanted()
@@ -348,7 +350,13 @@ class Drawing:
         height, width, _ = self.pixels.shape
         if _has_target(self.settings) or view.target.shape[1:] != (height, width):
             return view
-        return view._replace(samples=next((n for n in SAMPLES if n * max(height, width) <= SAMPLED), 1))
+        return view._replace(samples=SAMPLES) if max(height, width) <= SMALL else view
+
+    def _is_told(self) -> bool:
+        """Whether nothing is missing but how edges are antialiased."""
+        if not self.scene.groups or self.settings.shapes != AUTO or _has_target(self.settings):
+            return False
+        return error_of(self.scene, self.sizes.joint._replace(samples=SAMPLES)) <= self.floor
 
     def _finish_as_wanted(self) -> None:
         """Finishes the scene. A FLIP that it has reached is kept, by no more layers than that takes."""
