@@ -94,7 +94,7 @@ def random_scene(
     made = []
     for i in range(layers):
         kind = kinds[i % len(kinds)]
-        several = i % 3 == 2 and kind in SOFT and bool(joins)
+        several = (i + i // len(kinds)) % 3 == 2 and kind in SOFT and bool(joins)  # not the same kinds always
         more = r.choices([k for k in kinds if k in SOFT], k=r.choice((1, 2))) if several else ()
         made.append(random_layer((kind, *more), r, compositing, paints[i % len(paints)], joins))
     background = None if transparent else (r.random(), r.random(), r.random())
@@ -103,7 +103,7 @@ def random_scene(
 
 # Every kind, paint and join, in families of few structures: each structure costs seconds to compile.
 FAMILIES: dict[str, list[Structure]] = {
-    "plain": [(Part("circle"),), (Part("box"),), (Part("arc"),)],
+    "plain": [(Part("circle"),), (Part("box"),), (Part("arc"),), (Part("rounded_triangle"),)],
     "union": [(Part("circle"), Part("triangle", "linear", "union")), (Part("ellipse", "linear"),)],
     "cut": [
         (Part("box", "linear"), Part("circle", join="subtraction"), Part("ellipse", join="intersection")),
