@@ -94,7 +94,8 @@ def random_scene(
     made = []
     for i in range(layers):
         kind = kinds[i % len(kinds)]
-        several = (i + i // len(kinds)) % 3 == 2 and kind in SOFT and bool(joins)  # not the same kinds always
+        turn = 0 if len(kinds) % 3 else i // len(kinds)  # else the same kinds would always be joined
+        several = (i + turn) % 3 == 2 and kind in SOFT and bool(joins)
         more = r.choices([k for k in kinds if k in SOFT], k=r.choice((1, 2))) if several else ()
         made.append(random_layer((kind, *more), r, compositing, paints[i % len(paints)], joins))
     background = None if transparent else (r.random(), r.random(), r.random())
