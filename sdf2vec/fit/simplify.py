@@ -136,23 +136,26 @@ def _circle(layer: Group, view: View) -> Iterator[Change]:
 
 
 def _triangle(layer: Group, view: View) -> Iterator[Change]:
-    """A triangle with round corners as one with sharp corners whose sides lie where its sides do."""
+    """A triangle with corners that are a little round as one with sharp corners whose sides lie where its sides do."""
     for index, part in enumerate(layer.structure):
-        if part.kind == ROUNDED:
-            radius, corners = layer.of("corner_radius", index), [layer.of(name, index) for name in "abc"]
-            opposite = [
-                (corners[i - 1] - corners[i - 2]).norm(dim=1, keepdim=True).clamp_min(SMALLEST)
-                for i in range(3)
-            ]
-            around = torch.stack(opposite).sum(0)
-            middle = (
-                torch.stack([side * at for side, at in zip(opposite, corners, strict=True)]).sum(0) / around
-            )
-            one, other = corners[1] - corners[0], corners[2] - corners[0]
-            twice = (one[:, :1] * other[:, 1:] - one[:, 1:] * other[:, :1]).abs().clamp_min(SMALLEST * around)
-            grown = 1.0 + radius * around / twice  # of what lies around the middle of the circle within
-            sharp = {name: middle + grown * (at - middle) for name, at in zip("abc", corners, strict=True)}
-            yield with_part(layer, index, part._replace(kind="triangle"), sharp), ()
+        if part.kind != ROUNDED:
+            continue
+        corners = torch.stack([layer.of(name, index) for name in "abc"])
+        middle, radius = _incircle(corners)
+        further = layer.of("corner_radius", index) / radius
+        if float(further) < 1.0:
+            sharp = middle + (corners - middle) * (1.0 + further)
+            own = dict(zip("abc", sharp, strict=True))
+            yield with_part(layer, index, part._replace(kind="triangle"), own), ()
+
+
+def _incircle(corners: torch.Tensor) -> tuple[torch.Tensor, torch.Tensor]:
+    """The middle [1, 2] and radius [1, 1] of the circle that touches the sides of a triangle [3, 1, 2] from within."""
+    opposite = (corners.roll(1, 0) - corners.roll(2, 0)).norm(dim=2, keepdim=True).clamp_min(SMALLEST)
+    around = opposite.sum(0)
+    (x, y), (to_x, to_y) = ((corners[i] - corners[0]).unbind(1) for i in (1, 2))
+    radius = (x * to_y - y * to_x).abs()[:, None] / around
+    return (opposite * corners).sum(0) / around, radius.clamp_min(SMALLEST)
 
 
 def middle_of(layer: Group, index: int) -> tuple[torch.Tensor, torch.Tensor]:
