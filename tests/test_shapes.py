@@ -42,12 +42,7 @@ BY_HAND = [
     ("triangle", (0.0, 0.0, 2.0, 0.0, 1.0, 0.0), (1.0, 3.0), 3.0),  # flat: the distance to a line
     ("triangle", (1.0, 1.0, 1.0, 1.0, 1.0, 1.0), (4.0, 5.0), 5.0),  # a point
     ("rounded_triangle", (0.0, 0.0, 4.0, 0.0, 0.0, 3.0, 0.5), (1.0, 1.0), -1.5),
-    (
-        "rounded_triangle",
-        (0.0, 0.0, 4.0, 0.0, 0.0, 3.0, 0.5),
-        (7.0, -4.0),
-        4.5,
-    ),  # from the circle at a corner
+    ("rounded_triangle", (0.0, 0.0, 4.0, 0.0, 0.0, 3.0, 0.5), (7.0, -4.0), 4.5),  # from a corner's circle
     ("rounded_triangle", (0.0, 0.0, 4.0, 0.0, 0.0, 3.0, 0.5), (2.0, -0.5), 0.0),
     ("rounded_triangle", (0.3, 0.3, 0.3, 0.3, 0.3, 0.3, 0.1), (3.3, 4.3), 4.9),  # a dot
     ("arc", (-1.0, 0.0, 1.0, 0.0, -1.0, 0.1), (0.0, -3.0), 1.9),  # the upper half of the unit circle

@@ -347,10 +347,8 @@ class Drawing:
         it is said how near shapes are to come: that is measured as the renderer draws them.
         """
         view = looked_at(self.pixels, self.settings, resolution)
-        height, width, _ = self.pixels.shape
-        if _has_target(self.settings) or view.target.shape[1:] != (height, width):
-            return view
-        return view._replace(samples=SAMPLES) if max(height, width) <= SMALL else view
+        is_small = max(self.picture.width, self.picture.height) <= SMALL
+        return view._replace(samples=SAMPLES) if is_small and not _has_target(self.settings) else view
 
     def _is_told(self) -> bool:
         """Whether nothing is missing but how edges are antialiased."""

@@ -65,7 +65,7 @@ class SceneProblem:
     def __init__(self, scene: SceneTensors, view: View) -> None:
         self.scene, self.view = scene, view
         self.channels, height, width = view.target.shape
-        height, width = view.samples * height, view.samples * width
+        self.sides = height, width = view.samples * height, view.samples * width  # in samples
         rows, columns = -(-height // TILE), -(-width // TILE)
         x, y, pixel = canvas_axes(scene.size, columns * TILE, rows * TILE, width, height)
         self.pixel = float(pixel)
@@ -119,8 +119,8 @@ class SceneProblem:
     def normal(self, rows: torch.Tensor, free: IntArray) -> Equations:
         """The normal equations by the free numbers."""
         scene = self.scene_of(rows)
-        _, height, width = self.view.target.shape
-        bins = fused.bins_of(scene, self.view.samples * width, self.view.samples * height)
+        height, width = self.sides
+        bins = fused.bins_of(scene, width, height)
         order, kinds, packed = fused.drawn_rows(scene, self.pixel)
         most = int(np.diff(bins.starts).max(initial=1))
         total = int(self.offsets[-1]) + self.channels

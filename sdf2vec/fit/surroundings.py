@@ -25,8 +25,8 @@ SEEN = 0.2  # of what is below, at least, where its colour is told from what is 
 
 
 class View(NamedTuple):
-    """A picture at some size: premultiplied [C, H, W], how much an error matters there [H, W], or None, and of how many
-    samples across each pixel is the mean: the more, the more as drawings are antialiased.
+    """A picture at some size: premultiplied [C, H, W], how much an error matters there [H, W], or None, and how many
+    samples across a pixel of a scene its mean is taken of: several are nearer to how drawings are antialiased.
     """
 
     target: torch.Tensor

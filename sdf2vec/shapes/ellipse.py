@@ -20,12 +20,12 @@ def sd_ellipse(p: Expr, radii: Expr) -> Expr:
 
 
 def ellipse_distance(p: Expr, center: Expr, radii: Expr, angle: Expr) -> Expr:
-    """The field in the ellipse's own frame."""
+    """The field of a scaled circle that is turned."""
     return sd_ellipse(rotate(p - center, direction(angle)), radii)
 
 
 def ellipse_extent(margin: Expr, center: Expr, radii: Expr, angle: Expr) -> Expr:
-    """Of the grown ellipse."""
+    """A box around what is within a margin of an ellipse, by that field."""
     r = maximum(radii, SMALLEST)
     grown = r + r * (margin / smaller_component(r))
     along, across = direction(angle) * grown.x, direction(angle) * grown.y
@@ -37,7 +37,8 @@ def _ellipse_area(center: Expr, radii: Expr, angle: Expr) -> Expr:
     return math.pi * radii.x * radii.y
 
 
-def _ellipse_thickness(center: Expr, radii: Expr, angle: Expr) -> Expr:
+def ellipse_thickness(center: Expr, radii: Expr, *rest: Expr) -> Expr:
+    """Twice the shorter half axis."""
     return 2.0 * smaller_component(radii)
 
 
@@ -52,7 +53,7 @@ ELLIPSE = Kind(
     ellipse_distance,
     ellipse_extent,
     _ellipse_area,
-    _ellipse_thickness,
+    ellipse_thickness,
     exact=False,
     outline=_ellipse_outline,
     own_frame=turned_frame,

@@ -11,7 +11,7 @@ from ..kind import SMALLEST, Kind, Patch, rotate
 from ..operation import FLOAT, VEC2
 from ..units import ANGLE, FREQUENCY, Parameter
 from .common import angle_named, direction, position, size, smaller_component, turned_frame
-from .ellipse import ellipse_distance, ellipse_extent
+from .ellipse import ellipse_distance, ellipse_extent, ellipse_thickness
 
 REACH = math.sqrt(2.0 * math.log(1.0 / CUTOFF))  # standard deviations from which on a Gaussian counts as 0
 PIXEL_VARIANCE = 1.0 / 12.0  # of a box of one pixel
@@ -67,17 +67,13 @@ def _patch_area(center: Expr, radii: Expr, *rest: Expr) -> Expr:
     return math.tau * radii.x * radii.y
 
 
-def _patch_thickness(center: Expr, radii: Expr, *rest: Expr) -> Expr:
-    return 2.0 * smaller_component(radii)
-
-
 GAUSSIAN = Kind(
     "gaussian",
     (position("center"), size("radii", 0.8, 0.5), angle_named("angle")),
     _patch_distance,
     _patch_extent,
     _patch_area,
-    _patch_thickness,
+    ellipse_thickness,
     exact=False,
     own_frame=turned_frame,
     patch=Patch(_gaussian_cover, _patch_reach, radial=True),
@@ -95,7 +91,7 @@ GABOR = Kind(
     _patch_distance,
     _patch_extent,
     _patch_area,
-    _patch_thickness,
+    ellipse_thickness,
     exact=False,
     own_frame=turned_frame,
     patch=Patch(_gabor_cover, _patch_reach, signed=True),
