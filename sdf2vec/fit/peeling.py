@@ -23,6 +23,7 @@ from .hairlines import hairlines
 from .joining import Search, topped
 from .outlining import best_outlined
 from .region_graph import Regions
+from .slopes import even
 from .surroundings import Surroundings, View
 from .transparency import Overlay, bared, overlays
 from .windows import Part, Sides, larger, means, smaller, widened
@@ -34,6 +35,7 @@ KNOWN = 0.5  # share of it that is flat regions, for any to be
 POINTS = 4000  # at most, at which an outline is looked for
 MARGIN = 0.2, 4  # around a region: share of its longer side, and pixels
 MOSTLY = 0.5  # share of an edge beyond a shape
+SOFT = 0.25  # share of an edge that is so, of what is told to be soft
 HIDDEN = 0.5  # share of another region, at most, that a layer on top covers
 
 
@@ -47,7 +49,7 @@ def peeled(scene: SceneTensors, views: Sequence[View], search: Search) -> SceneT
     """
     pixels = views[-1].target.permute(1, 2, 0).numpy().astype(np.float64)
     regions = Regions.of(pixels)
-    if np.mean(regions.labels > 0) < KNOWN:
+    if np.mean((regions.labels > 0) | even(pixels)) < KNOWN:
         return scene
     outlines = Outlines(scene, [Surroundings.of(scene, 0, view) for view in views], search)
     finest = outlines.around[-1]
@@ -176,21 +178,23 @@ class Outlines:
         self.before[name] = near, best
         return best
 
-    def _areas(self, own: Part, overlay: Overlay, regions: Regions) -> tuple[Area, Area]:
+    def _areas(self, place: Part, overlay: Overlay, regions: Regions) -> tuple[Area, Area]:
         """Where an overlay is, in a window around a part of the largest surroundings in which that has at most `POINTS`
         points, and in one of the finest.
         """
         sides = regions.sides
-        soft = _is_soft(overlay.inside, widened(own, 2, sides), regions)
-        windows = [_with_margin(smaller(own, sides, around.shape), around.shape) for around in self.around]
+        soft = _is_soft(overlay.inside, widened(place, 2, sides), regions)
+        windows = [_with_margin(smaller(place, sides, around.shape), around.shape) for around in self.around]
         near = max((i for i, window in enumerate(windows) if _points(window) <= POINTS), default=0)
 
         def area(index: int) -> Area:
             around, window = self.around[index], windows[index]
             part = larger(window, sides, around.shape)
+            own, beyond = (regions.mask(chosen, part) for chosen in (overlay.inside, overlay.outside))
+            if overlay.opacity == 1.0:
+                beyond |= regions.slopes.beyond(own, part)
             inside, others = (
-                torch.from_numpy(means(regions.mask(chosen, part), window, sides, around.shape)).flatten()
-                for chosen in (overlay.inside, overlay.outside)
+                torch.from_numpy(means(mask, window, sides, around.shape)).flatten() for mask in (own, beyond)
             )
             return Area(overlay, inside, inside + others, window, around.window(*window), soft)
 
@@ -309,12 +313,13 @@ def _with_margin(part: Part, sides: Sides) -> Part:
 
 
 def _is_soft(chosen: BoolArray, part: Part, regions: Regions) -> bool:
-    """Whether most of the edge of some regions [R], around which a part goes, goes over into others by colours that no
-    region has.
+    """Whether much of the edge of some regions [R], around which a part goes, goes over into others by colours that no
+    region has, without a jump.
     """
-    inside = regions.mask(chosen, part)
+    inside, slopes = regions.mask(chosen, part), regions.slopes
     edge = inside & ~ndimage.binary_erosion(inside, border_value=1)
-    return bool((edge & ndimage.binary_dilation(~regions.sure[part])).sum() > 0.5 * edge.sum())
+    unsure = ndimage.binary_dilation(~(regions.sure | slopes.ends)[part]) & ~slopes.jumps[part]
+    return bool((edge & unsure).sum() > SOFT * edge.sum())
 
 
 def _points(window: Part) -> int:

@@ -12,11 +12,12 @@ from .description import is_longer
 from .draw_order import reordered, touching, without, without_all
 from .joining import Search
 from .least_squares import count_numbers
-from .surroundings import error_of, points_of
+from .surroundings import error_of, local_error, points_of
 
 FLOOR = 10**-4.4  # mean squared error, 44 dB: below it nothing is missing
 NEEDLESS = 1.05  # how much the error may rise by a layer taken out, after a descent
 NEARLY = 1.2  # times that, after a descent of all, where one of each layer may help
+SEEN = (6.0 / 255) ** 2  # by how much the mean of the squared errors nearby may rise
 LITTLE = 0.25  # at most, by this share of what a layer explains in the mean
 
 
@@ -66,9 +67,15 @@ def _bare(
         smaller = (beside[order] & (areas < areas[order])).nonzero()[:, 0].tolist()
         if len(smaller) > 1:
             fewer, error = _settled(without_all(scene, smaller), sizes, search, worst, hope)
-            if error <= worst:
+            if error <= worst and not _is_seen(fewer, scene, sizes):
                 return fewer, error
     return None
+
+
+def _is_seen(fewer: SceneTensors, scene: SceneTensors, sizes: Sizes) -> bool:
+    """Whether somewhere a picture is clearly farther from a scene than from another."""
+    one, other = (local_error(each, sizes.joint) for each in (fewer, scene))
+    return float((one - other).max()) > SEEN
 
 
 def _settled(
@@ -102,6 +109,8 @@ def _fewer(
     for error, fewer in sorted(hopeful, key=lambda pair: count_numbers(pair[1])):
         if error > worst and fewer.layer_count:
             fewer, error = _settled(fewer, sizes, search, worst, hope)
-        if error <= worst and not (hope.brief and is_longer(fewer, scene, sizes.joint)):
+        if error > worst or (hope.brief and is_longer(fewer, scene, sizes.joint)):
+            continue
+        if not (hope.softness and _is_seen(fewer, scene, sizes)):
             return fewer, error
     return None

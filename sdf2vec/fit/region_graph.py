@@ -13,6 +13,7 @@ from scipy.sparse import coo_matrix
 from scipy.sparse.csgraph import connected_components
 
 from ..arrays import BoolArray, Float64Array, IntArray
+from .slopes import Slopes, steps
 from .windows import NOWHERE, Part, Sides, extent, moved
 
 # how far neighbours of a flat region differ at most; and any two of most of its pixels
@@ -31,12 +32,13 @@ BESIDE = 2  # pixels of a common edge that make neighbours
 
 @dataclass(frozen=True, eq=False)
 class Regions:
-    """Regions by number from 1, 0 for none, [H, W], and where that is sure; the colour [R, C] of each, and how far that
-    may be off [R].
+    """Regions by number from 1, 0 for none, [H, W], and where that is sure; the slopes between them; the colour
+    [R, C] of each, and how far that may be off [R].
     """
 
     labels: IntArray
     sure: BoolArray
+    slopes: Slopes
     colors: Float64Array
     doubts: Float64Array
 
@@ -46,16 +48,16 @@ class Regions:
         parts = connected(
             _calm(pixels), lambda one, other: np.abs(pixels[one] - pixels[other]).max(axis=2) <= STEADY
         )
-        labels, sure, colors = np.zeros_like(parts), np.zeros(parts.shape, bool), []
-        for inside in largest(parts, LEAST):
-            color = np.median(pixels[inside], axis=0)
-            if np.mean(np.abs(pixels[inside] - color).max(axis=1) <= EVEN / 2) >= MOSTLY:
-                colors.append(color)
-                labels[inside] = len(colors)
-        known = np.array(colors).reshape(-1, pixels.shape[2])
-        if colors:
-            labels, sure = _shared_out(pixels, labels, known)
-        return cls(labels, sure, known, np.full(len(known), EXACT)).merged()
+        flat = [inside for inside in largest(parts, LEAST) if _is_flat(pixels[inside])]
+        cores = np.zeros_like(parts)
+        for number, inside in enumerate(flat, 1):
+            cores[inside] = number
+        is_step = steps(pixels, cores)
+        flat = [inside for inside, step in zip(flat, is_step, strict=True) if not step]
+        cores = np.concatenate([[0], np.where(is_step, 0, np.cumsum(~is_step))])[cores]
+        colors = np.array([np.median(pixels[inside], axis=0) for inside in flat]).reshape(-1, pixels.shape[2])
+        labels, sure, slopes = _shared_out(pixels, cores, colors)
+        return cls(labels, sure, slopes, colors, np.full(len(colors), EXACT)).merged()
 
     @cached_property
     def borders(self) -> IntArray:
@@ -150,7 +152,12 @@ class Regions:
         doubts[one] = self.doubts[pair].min()
         labels = np.where(self.labels == other + 1, one + 1, self.labels)
         labels = labels - (labels > other + 1)
-        return Regions(labels, self.sure, np.delete(colors, other, axis=0), np.delete(doubts, other))
+        return replace(
+            self,
+            labels=labels,
+            colors=np.delete(colors, other, axis=0),
+            doubts=np.delete(doubts, other),
+        )
 
 
 def _calm(pixels: Float64Array) -> BoolArray:
@@ -162,6 +169,12 @@ def _calm(pixels: Float64Array) -> BoolArray:
     for rows, columns in product((slice(None, -1), slice(1, None)), repeat=2):
         calm[rows, columns] |= squares
     return calm
+
+
+def _is_flat(colors: Float64Array) -> bool:
+    """Whether most colours [P, C] are one."""
+    away = np.abs(colors - np.median(colors, axis=0)).max(axis=1)
+    return float(np.mean(away <= EVEN / 2)) >= MOSTLY
 
 
 def connected(chosen: BoolArray, alike: Callable[[Part, Part], BoolArray]) -> IntArray:
@@ -189,24 +202,38 @@ def largest(parts: IntArray, least: int) -> Iterator[BoolArray]:
             yield parts == number
 
 
-def _shared_out(pixels: Float64Array, cores: IntArray, colors: Float64Array) -> tuple[IntArray, BoolArray]:
+def _shared_out(
+    pixels: Float64Array, cores: IntArray, colors: Float64Array
+) -> tuple[IntArray, BoolArray, Slopes]:
     """Of a picture [H, W, C] what is in no region as well, each of that which is likest nearby, else of the nearest;
-    and where that is sure.
+    where that is sure; and its slopes: what is beyond an edge is in no region.
     """
+    slopes = Slopes.of(pixels, cores)
+    if not len(colors):
+        return cores, cores > 0, slopes
+    cores = np.where(slopes.ends, len(colors) + 1, cores)
+    shown = np.where(slopes.ends[..., None], pixels, colors[np.minimum(cores, len(colors)) - 1])
     away, nearest = ndimage.distance_transform_edt(cores == 0, return_indices=True)
     labels = np.where(away <= REACH, cores[tuple(nearest)], 0)
-    padded = np.pad(cores, 2)
+    own = shown[tuple(nearest)]
+    padded, around = np.pad(cores, 2), np.pad(shown, ((2, 2), (2, 2), (0, 0)))
     least = np.where(cores > 0, 0.0, np.inf)
+    height, width = cores.shape
     for down, right in product(range(5), repeat=2):
-        beside = padded[down:, right:][: cores.shape[0], : cores.shape[1]]
-        apart = np.where(beside > 0, np.abs(pixels - colors[beside - 1]).max(axis=2), np.inf)
-        labels = np.where(apart < least, beside, labels)
+        beside, color = (each[down:, right:][:height, :width] for each in (padded, around))
+        apart = np.where(beside > 0, np.abs(pixels - color).max(axis=2), np.inf)
+        nearer = apart < least
+        labels, own = np.where(nearer, beside, labels), np.where(nearer[..., None], color, own)
         least = np.minimum(apart, least)
-    return labels, (away <= SURELY) & ~_foreign(pixels, labels, colors)
+    sure = (away <= SURELY) & ~_foreign(pixels, labels, own)
+    is_region = labels <= len(colors)
+    return labels * is_region, sure & is_region, replace(slopes, ends=sure & ~is_region)
 
 
-def _foreign(pixels: Float64Array, labels: IntArray, colors: Float64Array) -> BoolArray:
-    """Where a picture [H, W, C] has another colour than the region there though no other is near: what is thin."""
+def _foreign(pixels: Float64Array, labels: IntArray, own: Float64Array) -> BoolArray:
+    """Where a picture [H, W, C] has another colour than that of the region there though no other is near: what is
+    thin.
+    """
     alone: BoolArray = ndimage.maximum_filter(labels, NEAR) == ndimage.minimum_filter(labels, NEAR)
-    apart: Float64Array = np.abs(pixels - colors[labels - 1]).max(axis=2)
+    apart: Float64Array = np.abs(pixels - own).max(axis=2)
     return alone & (apart > EVEN) & (labels > 0)

@@ -17,12 +17,12 @@ from scipy import ndimage
 from ..arrays import BoolArray, Float32Array, IntArray
 from ..image import Picture, unpremultiply
 from .region_graph import connected, largest
+from .slopes import BENT, even
 from .views import scaled
 from .windows import Part, Sides, extent, larger, widened
 
 WHITE = 255  # levels
 LOOKED = 320  # pixels squared, at which regions are looked for
-BENT, STEEP = 2.2 / 255, 16.0 / 255  # second differences of what is even, at most; first ones
 PLANE, NEARLY = 2.2 / 255, 0.98  # how far a region is from a plane at most; share of it that is as near
 BENDS = 0.06  # how far it may be, too, by what its colour changes: as where there is a third one in between
 SMALLEST = 3  # pixels of a side, for anything to be even
@@ -84,8 +84,9 @@ class Shading:
     @cached_property
     def graded(self) -> list[int]:
         """The numbers of the regions that are gradients with sharp edges."""
-        numbers = (number for number, shade in enumerate(self.shades, 1) if not shade.is_flat)
-        return [number for number in numbers if _is_sharp(self.labels, number)]
+        numbers = [number for number, shade in enumerate(self.shades, 1) if not shade.is_flat]
+        calm = even(scaled(self.pixels, LOOKED).permute(1, 2, 0).numpy()) if numbers else None
+        return [number for number in numbers if calm is not None and _is_sharp(self.labels, number, calm)]
 
     @cached_property
     def nearest(self) -> IntArray:
@@ -182,12 +183,16 @@ def _share(apart: Float32Array, near: BoolArray) -> Float32Array:
     return found
 
 
-def _is_sharp(labels: IntArray, number: int) -> bool:
-    """Whether other regions begin where a region ends, or it goes on."""
-    inside = labels == number
-    within = ndimage.binary_dilation(inside, np.ones((3, 3)), iterations=REACH)
-    beyond = ndimage.binary_dilation(within, np.ones((3, 3))) & ~within
-    return not beyond.any() or float((labels[beyond] > 0).mean()) >= SHARP
+def _is_sharp(labels: IntArray, number: int, calm: BoolArray) -> bool:
+    """Whether other regions begin where a region ends, or it goes on; or, beyond an edge, what is calm [H, W]."""
+    inside, square = labels == number, np.ones((3, 3))
+    within = ndimage.binary_dilation(inside, square, iterations=REACH)
+    beyond = ndimage.binary_dilation(within, square) & ~within
+    if not beyond.any():
+        return True
+    edge = ndimage.binary_dilation(inside, square) & ~inside
+    has_edge = calm[edge].mean() <= 1.0 - SHARP
+    return float(((labels > 0) | (calm & has_edge))[beyond].mean()) >= SHARP
 
 
 # --- regions --------------------------------------------------------------------------------------------------
@@ -220,28 +225,11 @@ def _planes(pixels: Float32Array) -> Iterator[BoolArray]:
     """
     if min(pixels.shape[:2]) < SMALLEST:
         return
-    even = _even(pixels)
     slopes = np.concatenate([np.gradient(pixels, axis=axis) for axis in (0, 1)], axis=2)
-    parts = connected(even, lambda one, other: np.abs(slopes[one] - slopes[other]).max(axis=2) <= BENT)
+    parts = connected(
+        even(pixels), lambda one, other: np.abs(slopes[one] - slopes[other]).max(axis=2) <= BENT
+    )
     yield from largest(parts, LEAST)
-
-
-def _even(pixels: Float32Array) -> BoolArray:
-    """Where a picture [H, W, C] hardly bends, and is not steep, from a pixel to all of those around it."""
-    even = np.zeros(pixels.shape[:2], bool)
-    middle = pixels[1:-1, 1:-1]
-    bent: Float32Array = np.zeros_like(middle[..., 0])
-    steep = bent
-    for one, other in (
-        (pixels[1:-1, :-2], pixels[1:-1, 2:]),
-        (pixels[:-2, 1:-1], pixels[2:, 1:-1]),
-        (pixels[:-2, :-2], pixels[2:, 2:]),
-        (pixels[:-2, 2:], pixels[2:, :-2]),
-    ):
-        bent = np.maximum(bent, np.abs(one + other - 2 * middle).max(axis=2))
-        steep = np.maximum(steep, np.abs(one - other).max(axis=2) / 2)
-    even[1:-1, 1:-1] = (bent <= BENT) & (steep <= STEEP)
-    return even
 
 
 def _shade(x: Float32Array, y: Float32Array, colors: Float32Array) -> Shade | None:

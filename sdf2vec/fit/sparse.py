@@ -20,6 +20,7 @@ from .offers import Offer, choices, offers
 from .peeling import peeled
 from .pruning import FLOOR, pruned
 from .ramps import lowest
+from .shadows import with_shadows
 from .surroundings import Surroundings, View, error_of
 
 PATIENCE, CLOSE = 2, 10**-3.9  # rounds; mean squared error, 39 dB, below which there is none for a second
@@ -89,8 +90,8 @@ def taken_apart(scene: SceneTensors, sizes: Sizes, search: Search, most: int) ->
     if not 0 < made.layer_count <= most:
         return scene
     sizes, search = fine_enough(sizes, search, made)
-    made = softer(descended(made, sizes.joint, search, JOINT), sizes.joint, search)
-    made = descended(made, sizes.joint, search, JOINT)
+    made = with_shadows(made, sizes, search)
+    made = descended(softer(made, sizes.joint, search), sizes.joint, search, JOINT)
     return min(scene, made, key=partial(error_of, view=sizes.joint))
 
 

@@ -21,6 +21,7 @@ from .levenberg import Dense, Problem
 # shapes in a layer, and points: there are too many structures of more shapes to compile kernels for a look at less
 MOST_COMPILED, GLANCE = 6, 2500
 
+NEARBY = 5  # pixels across
 SEEN = 0.2  # of what is below, at least, where its colour is told from what is shown
 
 
@@ -57,6 +58,14 @@ def _drawn(scene: SceneTensors, view: View) -> torch.Tensor:
 def error_of(scene: SceneTensors, view: View) -> float:
     """The weighted mean squared error of a scene."""
     return float(squared_error(scene, view))
+
+
+@torch.no_grad()
+def local_error(scene: SceneTensors, view: View) -> torch.Tensor:
+    """The same around each pixel that is not at the rim, [H - 4, W - 4]; of a smaller picture [1, 1]."""
+    wrong = residual_of(scene, view).square().mean(0)[None]
+    across = [min(NEARBY, side) for side in wrong.shape[1:]]
+    return torch.nn.functional.avg_pool2d(wrong, across, 1)[0]
 
 
 def squared_error(scene: SceneTensors, view: View) -> torch.Tensor:

@@ -3,15 +3,18 @@
 from dataclasses import replace
 
 import pytest
+from scipy import ndimage
 
 from sdf2vec.fit import pruning
-from sdf2vec.fit.descents import Sizes
-from sdf2vec.fit.pruning import BRIEF, FLOOR, USUAL
+from sdf2vec.fit.descents import LAST, Sizes, descended, softened
+from sdf2vec.fit.draw_order import without
+from sdf2vec.fit.pruning import BRIEF, FLOOR, THOROUGH, USUAL
 from sdf2vec.fit.surroundings import error_of
 from sdf2vec.render.tensors import from_scene, to_scene
 from sdf2vec.scene import Scene
 from tests.fit.drawn import (
     BLUE,
+    FINER,
     GREEN,
     RED,
     SIDE,
@@ -52,3 +55,18 @@ def test_what_is_told_more_shortly_stays(hope, count):
     worst = 2.0 * error_of(from_scene(Scene(SIDE, SIDE, layers[:1], rgb(WHITE))), view)
     left = pruning.pruned(scene, Sizes(view, view, view), search_of(), worst, hope)
     assert left.layer_count == count
+
+
+def test_what_would_be_seen_stays_though_little_is_wrong_without_it():
+    """A square with a shadow of nearly its own colour: a soft square alone is near to both by the mean."""
+    soft = ndimage.gaussian_filter(box(40, 42, 60, 62).astype(float), 2 * FINER)
+    pixels = painted((soft, 0.75 * WHITE, 1.0), (box(40, 40, 60, 60), 0.87 * WHITE, 1.0))
+    shadow = replace(sharp_box(0.75 * WHITE, 42, 44, 58, 60), falloff=6 / SIDE)
+    layers = shadow, sharp_box(0.87 * WHITE, 40, 40, 60, 60)
+    view = view_of(pixels)
+    sizes, search = Sizes(view, view, view), search_of()
+    scene = descended(from_scene(Scene(SIDE, SIDE, layers, rgb(WHITE))), view, search, LAST)
+    assert error_of(scene, view) < FLOOR / 2
+    alone = descended(softened(without(scene, 0), THOROUGH.softness, view), view, search, LAST)
+    assert error_of(alone, view) < FLOOR
+    assert pruning.pruned(scene, sizes, search, FLOOR, THOROUGH).layer_count == 2
