@@ -288,9 +288,8 @@ class Drawing:
         try:
             self._announce_compiling()
             self.scene = grounded(self.scene, self.sizes.joint, self.search)
-            if not self.scene.groups:
-                self.scene = taken_apart(self.scene, self.sizes, self.search, self.settings.most)
-                self.sizes, self.search = fine_enough(self.sizes, self.search, self.scene)
+            self.scene = taken_apart(self.scene, self.sizes, self.search, self.settings.most)
+            self.sizes, self.search = fine_enough(self.sizes, self.search, self.scene)
             outlined, helped = self.scene.layer_count, []
             rounds = grow(self.scene, self.sizes, self.search, self.settings.most, self.floor)
             for made in () if self._is_told() else rounds:

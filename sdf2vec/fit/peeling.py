@@ -41,7 +41,7 @@ HIDDEN = 0.5  # share of another region, at most, that a layer on top covers
 
 @torch.no_grad()
 def peeled(scene: SceneTensors, views: Sequence[View], search: Search) -> SceneTensors:
-    """The scene, which has no layers, with those of a picture that can be told by their outlines.
+    """The scene, which has no layers but a ramp's, with those of a picture that can be told by their outlines.
 
     What has a soft edge is taken off, too, but it is not kept: of which kind it is, its colours tell better.
     None where little of the picture is flat: what regions a photograph has are no outlines. `views`: the picture at
@@ -51,9 +51,9 @@ def peeled(scene: SceneTensors, views: Sequence[View], search: Search) -> SceneT
     regions = Regions.of(pixels)
     if np.mean((regions.labels > 0) | even(pixels)) < KNOWN:
         return scene
-    outlines = Outlines(scene, [Surroundings.of(scene, 0, view) for view in views], search)
+    outlines = Outlines(scene, [Surroundings.of(scene, scene.layer_count, view) for view in views], search)
     finest = outlines.around[-1]
-    if plate := outlines.plate(regions):
+    if plate := None if scene.layer_count else outlines.plate(regions):
         corners = plate.overlay.outside
         scene = replace(scene, background=_opaque_color(regions.colors[corners][0]))
         # as if the plate went on there: what ends at its round corners is seen to end
@@ -95,16 +95,21 @@ class Outlines:
         found = top or good
         for whole in (True, False):
             if all(each.is_unlikely for each in found):
-                found += self._good(opaque(regions, self.scene.background.numpy(), whole), regions)
+                found += self._good(opaque(regions, self.ground, whole), regions)
         if not found:
-            found = self._good(holes(regions, self.scene.background.numpy()), regions)
+            found = self._good(holes(regions, self.ground), regions)
         return _apart(sorted(found, key=lambda each: each.rank), regions)
+
+    @property
+    def ground(self) -> np.ndarray:
+        """Its colour [4]; no number where it is a ramp, which has none that a region may have."""
+        return np.full(4, np.nan) if self.scene.layer_count else self.scene.background.numpy()
 
     def plate(self, regions: Regions) -> Outlined | None:
         """The shape in the ground's colour that covers all of the picture but its four corners, which are of another
         one; None if there is none.
         """
-        corners, ground = cornered(regions), self.scene.background.numpy()[: regions.colors.shape[1]]
+        corners, ground = cornered(regions), self.ground[: regions.colors.shape[1]]
         if not corners.any() or _of_color(regions, ground)[corners].any():
             return None
         told = self.told(Overlay(1.0, ground, ~corners, corners), regions)
@@ -143,7 +148,7 @@ class Outlines:
         """What has the outline of an overlay, as seen in a part of the picture and around it."""
         area, fine = self._areas(part, overlay, regions)
         best = self._of(area, fine)
-        is_ground = _of_color(regions, self.scene.background.numpy())
+        is_ground = _of_color(regions, self.ground)
         if best is None or not best.is_good or not _holds(best, area, fine, regions, is_ground):
             return None
         return replace(best, overlay=overlay)

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
+from typing import NamedTuple
 
 import torch
 
@@ -12,6 +14,7 @@ from ..render.tensors import Group, SceneTensors
 from .descents import JOINT, Sizes, descended
 from .draw_order import opened
 from .joining import Search, inserted
+from .ramps import lowest
 from .surroundings import Surroundings, error_of, layer_at
 
 OPAQUE = 0.9  # opacity of what may cast one, at least
@@ -21,65 +24,104 @@ ENOUGH = 10**-4.0  # mean squared error, 40 dB, below which none is looked for
 LEAST = 0.01  # share of all that is missing, that one takes away
 EXPLAINED, NEARBY = 0.2, 0.02  # share of what is missing there, too; coverage of what is there
 HELPS, FOUND = 0.8, 10**-2.5  # of the error before, and mean squared error, at most, with all of them
+SEEN = 0.3  # of it, at least: the rest lies under other layers
 FAINTEST, STRONGEST = 0.02, 0.95  # opacity
+CLEAR = 0.1  # of what is below, by which an opacity is told
 TINY = 1e-9
 OPACITY, FALLOFF = (Slot(None, parameter) for parameter in LOOK)
 
 
 @torch.no_grad()
 def with_shadows(scene: SceneTensors, sizes: Sizes, search: Search) -> SceneTensors:
-    """The scene after a descent of all, with what its layers cast where that clearly helps."""
-    bare = descended(scene, sizes.joint, search, JOINT)
-    before = error_of(bare, sizes.joint)
-    if before <= ENOUGH:
-        return bare
-    made, order = scene, 0
-    for _ in range(scene.layer_count):
-        shadow = _shadow(made, order, sizes, LEAST * before)
-        if shadow is not None:
-            made = inserted(opened(made, order), shadow)
-            order += 1
-        order += 1
-    if made is scene:
-        return bare
-    made = descended(descended(made, sizes.joint, search, JOINT), sizes.joint, search, JOINT)
-    return made if error_of(made, sizes.joint) <= min(HELPS * before, FOUND) else bare
+    """The scene after a descent of all, with what its layers cast where that clearly helps: first what is seen most."""
+    made, casting = descended(scene, sizes.joint, search, JOINT), list(range(scene.layer_count))
+    error = error_of(made, sizes.joint)
+    while casting and error > ENOUGH:
+        more, left = _with_more(scene, casting, sizes, LEAST * error)
+        if len(left) == len(casting):
+            break
+        more = descended(descended(more, sizes.joint, search, JOINT), sizes.joint, search, JOINT)
+        now = error_of(more, sizes.joint)
+        if now > min(HELPS * error, FOUND):
+            break
+        scene = made = more
+        casting, error = left, now
+    return made
 
 
-def _shadow(scene: SceneTensors, order: int, sizes: Sizes, least: float) -> Group | None:
-    """What a layer casts, to be put in its place of the draw order, below it; None if that is not seen."""
+def _with_more(
+    scene: SceneTensors, casting: Sequence[int], sizes: Sizes, least: float
+) -> tuple[SceneTensors, list[int]]:
+    """The scene with what some of its layers cast, by their places in the draw order, where that takes away so much of
+    the mean squared error; and the places of those of which nothing is seen yet.
+    """
+    places, left = list(casting), []
+    gains = [_shadow(scene, place, sizes).gain for place in places]
+    for index in sorted(range(len(places)), key=lambda index: -gains[index]):
+        shadow = _shadow(scene, places[index], sizes) if gains[index] >= least else None
+        if shadow is None or shadow.gain < least:
+            left.append(index)
+            continue
+        order = int(shadow.layer.order)
+        scene = inserted(opened(scene, order), shadow.layer)
+        places = [place + (place >= order) for place in places]
+    return scene, [places[index] for index in left]
+
+
+class Shadow(NamedTuple):
+    """What a layer casts, at its place of the draw order, and by how much the mean squared error falls with it."""
+
+    layer: Group
+    gain: float
+
+
+def _shadow(scene: SceneTensors, order: int, sizes: Sizes) -> Shadow:
+    """What a layer casts: on what is next below it, or below all that there is."""
     layer = layer_at(scene, order)
     pixel = 1.0 / min(sizes.last.target.shape[1:])
     if float(layer.opacity) < OPAQUE or float(layer.falloff) > SHARP * pixel:
-        return None
-    around = Surroundings.of(opened(scene, order), order, sizes.joint)
+        return Shadow(layer, 0.0)
+    cast = [
+        _cast(layer, Surroundings.of(opened(scene, place), place, sizes.joint), place)
+        for place in {order, lowest(scene)}
+    ]
+    return max(cast, key=lambda shadow: shadow.gain)
+
+
+def _cast(layer: Group, around: Surroundings, place: int) -> Shadow:
+    """What a layer casts at a place of the draw order."""
     through, missing = around.light - around.dark, around.residual.flatten(1)
     soft = [
         replace(layer, values={**layer.values, FALLOFF: torch.full_like(layer.falloff, each)})
         for each in FALLOFFS
     ]
-    covers = around.covers(layer.structure, torch.cat([each.rows() for each in soft]))
+    covers = around.covers(layer.structure, torch.cat([layer.rows(), *(each.rows() for each in soft)]))
+    beyond = covers[0] < NEARBY  # its own edge may be off by parts of a pixel
+    covers = covers[1:] * beyond
     felt = covers[:, None] * through * around.weights
     power = felt.square().sum(2).clamp_min(TINY)
     amounts = (felt * missing).sum(2) / power  # by which the colour must change, by least squares
     gains = (amounts.square() * power).sum(1) / missing.numel()
     near = (covers > NEARBY) & (through.mean(0) > NEARBY)
     wrong = (missing.square().sum(0) * near).sum(1) / missing.numel()
-    gains = torch.where(gains > EXPLAINED * wrong, gains, 0.0)
+    seen = (covers * through.mean(0)).sum(1) / covers.sum(1).clamp_min(TINY)
+    gains = torch.where((gains > EXPLAINED * wrong) & (seen > SEEN), gains, 0.0)
     best = int(gains.argmax())
-    if gains[best] < least:
-        return None
     under = (felt[best].square() * around.below).sum(1) / power[best]
-    return _colored(soft[best], amounts[best, :3], under[:3])
+    made = _colored(soft[best], amounts[best], under)
+    return Shadow(replace(made, order=torch.full_like(layer.order, place)), float(gains[best]))
 
 
-def _colored(layer: Group, change: torch.Tensor, under: torch.Tensor) -> Group | None:
-    """A layer that changes a colour [3] by so much, the most translucent that can; None where that is hardly seen."""
-    room = torch.where(change < 0, under, 1.0 - under).clamp_min(TINY)
-    opacity = min(float((change.abs() / room).max()), STRONGEST)
-    if opacity < FAINTEST:
-        return None
-    color = (under + change / opacity).clamp(0.0, 1.0)
+def _colored(layer: Group, change: torch.Tensor, under: torch.Tensor) -> Group:
+    """A layer that changes premultiplied channels [C] by so much: of what is opaque the most translucent that can."""
+    rest = 1.0 - under[3:]
+    if len(rest) and rest > CLEAR:
+        opacity = float(change[3] / rest)
+    else:
+        room = torch.where(change[:3] < 0, under[:3], 1.0 - under[:3]).clamp_min(TINY)
+        opacity = float((change[:3].abs() / room).max())
+    opacity = min(max(opacity, FAINTEST), STRONGEST)
+    color = (under[:3] + change[:3] / opacity).clamp(0.0, 1.0)
     values = {
         slot: color.expand_as(value).clone() if slot.parameter is BASE else value
         for slot, value in layer.values.items()

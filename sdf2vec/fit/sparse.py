@@ -83,11 +83,11 @@ def _alternatives(
 
 
 def taken_apart(scene: SceneTensors, sizes: Sizes, search: Search, most: int) -> SceneTensors:
-    """The bare scene with the layers that can be told by their outlines, after a descent of all, if that helps; as it
-    is where they are more than `most`.
+    """The scene, bare or with a ramp, with the layers that can be told by their outlines, after a descent of all, if
+    that helps; as it is where they are more than `most`.
     """
     made = peeled(scene, sizes, search)
-    if not 0 < made.layer_count <= most:
+    if not scene.layer_count < made.layer_count <= most:
         return scene
     sizes, search = fine_enough(sizes, search, made)
     made = with_shadows(made, sizes, search)

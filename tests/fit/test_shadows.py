@@ -98,6 +98,17 @@ def test_a_disc_keeps_its_edge_within_its_glow():
     assert scene.layers[1].shapes[0].parameters[2] == pytest.approx(18 / SIDE, abs=0.5 / SIDE)
 
 
+def test_on_a_gradient_what_has_an_edge_is_told_by_that():
+    """A disc with two spots and a glow, on a ramp."""
+    mask = disc(48, 44, 20)
+    spots = (disc(42, 38, 4), 0.85 * WHITE, 1.0), (disc(55, 50, 5), 0.85 * WHITE, 1.0)
+    glow = (blurred(mask, 5), WHITE, 0.6)
+    pixels = painted((box(0, 0, SIDE, SIDE), ramp(), 1.0), glow, (mask, WHITE, 1.0), *spots)
+    scene = fit(Picture(pixels.astype(np.float32)), seed=0)
+    assert [layer.shapes[0].kind for layer in scene.layers] == ["box", *["circle"] * 4]
+    assert distance(scene, pixels) > 40
+
+
 # --- shadows ------------------------------------------------------------------------------------------------
 
 
@@ -108,12 +119,36 @@ def shadowed(pixels, *layers):
     return to_scene(made, SIDE, SIDE), error_of(made, view)
 
 
-def test_a_shadow_is_put_below_what_casts_it():
-    scene, error = shadowed(
-        card((box(4, 4, 20, 20), BLUE, 1.0)), sharp_box(BLUE, 4, 4, 20, 20), sharp_box(RED, 30, 30, 66, 60)
-    )
+def test_a_shadow_lies_on_what_it_falls_on():
+    mask = box(30, 30, 66, 60)
+    soft = blurred(np.roll(mask, 3 * FINER, axis=0), 4)
+    pixels = painted((box(8, 8, 88, 88), BLUE, 1.0), (soft, BLACK, 0.5), (mask, RED, 1.0))
+    scene, error = shadowed(pixels, sharp_box(BLUE, 8, 8, 88, 88), sharp_box(RED, 30, 30, 66, 60))
     assert [layer.falloff > 0.05 for layer in scene.layers] == [False, True, False]
     assert error < 10**-4
+
+
+def test_a_shadow_lies_below_what_hides_it():
+    """That of the lower box does not fall on the upper one, which is of the same thing."""
+    lower, upper = box(24, 50, 72, 76), box(24, 30, 72, 50)
+    soft = blurred(np.roll(lower | upper, 3 * FINER, axis=0), 4)
+    pixels = painted((soft, BLACK, 0.5), (upper, BLUE, 1.0), (lower, RED, 1.0))
+    scene, error = shadowed(pixels, sharp_box(BLUE, 24, 30, 72, 50), sharp_box(RED, 24, 50, 72, 76))
+    assert scene.layers[0].falloff > 0.05
+    assert max(layer.falloff for layer in scene.layers[-2:]) < 0.02
+    assert error < 2 * 10**-4
+
+
+def test_a_shadow_on_nothing_has_the_opacity_that_is_left():
+    mask = box(30, 30, 66, 60)
+    alpha = painted((blurred(mask, 4), WHITE, 0.4), (mask, WHITE, 1.0), ground=BLACK)[..., :1]
+    color = painted((mask, RED, 1.0), ground=BLACK)
+    view = view_of(np.concatenate([color, alpha], axis=2))
+    scene = from_scene(Scene(SIDE, SIDE, (sharp_box(RED, 30, 30, 66, 60),), None))
+    made = to_scene(with_shadows(scene, Sizes(view, view, view), search_of()), SIDE, SIDE)
+    assert len(made.layers) == 2
+    assert made.layers[0].shapes[0].color == pytest.approx((0.0, 0.0, 0.0), abs=0.05)
+    assert made.layers[0].opacity < 0.5
 
 
 @pytest.mark.parametrize("layer", [sharp_box(RED, 30, 30, 66, 60), sharp_box(RED, 10, 30, 40, 60)])
