@@ -11,7 +11,7 @@ import torch
 from ..layer import LOOK, Slot
 from ..paints import BASE
 from ..render.tensors import Group, SceneTensors
-from .descents import JOINT, Sizes, descended
+from .descents import FEW, JOINT, Sizes, descended
 from .draw_order import opened
 from .joining import Search, inserted
 from .ramps import lowest
@@ -32,12 +32,14 @@ OPACITY, FALLOFF = (Slot(None, parameter) for parameter in LOOK)
 
 
 @torch.no_grad()
-def with_shadows(scene: SceneTensors, sizes: Sizes, search: Search) -> SceneTensors:
-    """The scene after a descent of all, with what its layers cast where that clearly helps: first what is seen most."""
+def with_shadows(scene: SceneTensors, sizes: Sizes, search: Search, most: int) -> SceneTensors:
+    """The scene after a descent of all, with what its layers cast where that clearly helps, first what is seen most; up
+    to `most` layers.
+    """
     made, casting = descended(scene, sizes.joint, search, JOINT), list(range(scene.layer_count))
     error = error_of(made, sizes.joint)
-    while casting and error > ENOUGH:
-        more, left = _with_more(scene, casting, sizes, LEAST * error)
+    while 0 < len(casting) <= FEW and error > ENOUGH:
+        more, left = _with_more(scene, casting, sizes, LEAST * error, most)
         if len(left) == len(casting):
             break
         more = descended(descended(more, sizes.joint, search, JOINT), sizes.joint, search, JOINT)
@@ -50,7 +52,7 @@ def with_shadows(scene: SceneTensors, sizes: Sizes, search: Search) -> SceneTens
 
 
 def _with_more(
-    scene: SceneTensors, casting: Sequence[int], sizes: Sizes, least: float
+    scene: SceneTensors, casting: Sequence[int], sizes: Sizes, least: float, most: int
 ) -> tuple[SceneTensors, list[int]]:
     """The scene with what some of its layers cast, by their places in the draw order, where that takes away so much of
     the mean squared error; and the places of those of which nothing is seen yet.
@@ -58,7 +60,8 @@ def _with_more(
     places, left = list(casting), []
     gains = [_shadow(scene, place, sizes).gain for place in places]
     for index in sorted(range(len(places)), key=lambda index: -gains[index]):
-        shadow = _shadow(scene, places[index], sizes) if gains[index] >= least else None
+        may = gains[index] >= least and scene.layer_count < most
+        shadow = _shadow(scene, places[index], sizes) if may else None
         if shadow is None or shadow.gain < least:
             left.append(index)
             continue

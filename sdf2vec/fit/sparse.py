@@ -90,7 +90,7 @@ def taken_apart(scene: SceneTensors, sizes: Sizes, search: Search, most: int) ->
     if not scene.layer_count < made.layer_count <= most:
         return scene
     sizes, search = fine_enough(sizes, search, made)
-    made = with_shadows(made, sizes, search)
+    made = with_shadows(made, sizes, search, most)
     made = descended(softer(made, sizes.joint, search), sizes.joint, search, JOINT)
     return min(scene, made, key=partial(error_of, view=sizes.joint))
 

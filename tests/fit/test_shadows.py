@@ -78,6 +78,12 @@ def test_a_box_with_a_shadow_is_two_boxes(color):
     assert distance(scene, pixels) > 42
 
 
+def test_there_are_no_more_shapes_than_are_allowed():
+    picture = Picture(card().astype(np.float32))
+    assert fit(picture, 1, seed=0).shape_count == 1
+    assert fit(picture, max_shapes=1, seed=0).shape_count == 1
+
+
 def test_each_of_four_keeps_its_own_and_none_is_left_out():
     """One has hardly another colour than its shadow: without it all would still be near by the mean."""
     places = (12, 12, RED), (56, 12, BLUE), (12, 56, 0.75 * WHITE), (56, 56, BLACK)
@@ -115,7 +121,7 @@ def test_on_a_gradient_what_has_an_edge_is_told_by_that():
 def shadowed(pixels, *layers):
     view = view_of(pixels)
     scene = from_scene(Scene(SIDE, SIDE, layers, rgb(WHITE)))
-    made = with_shadows(scene, Sizes(view, view, view), search_of())
+    made = with_shadows(scene, Sizes(view, view, view), search_of(), 8)
     return to_scene(made, SIDE, SIDE), error_of(made, view)
 
 
@@ -145,7 +151,7 @@ def test_a_shadow_on_nothing_has_the_opacity_that_is_left():
     color = painted((mask, RED, 1.0), ground=BLACK)
     view = view_of(np.concatenate([color, alpha], axis=2))
     scene = from_scene(Scene(SIDE, SIDE, (sharp_box(RED, 30, 30, 66, 60),), None))
-    made = to_scene(with_shadows(scene, Sizes(view, view, view), search_of()), SIDE, SIDE)
+    made = to_scene(with_shadows(scene, Sizes(view, view, view), search_of(), 8), SIDE, SIDE)
     assert len(made.layers) == 2
     assert made.layers[0].shapes[0].color == pytest.approx((0.0, 0.0, 0.0), abs=0.05)
     assert made.layers[0].opacity < 0.5
