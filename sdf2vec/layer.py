@@ -84,11 +84,14 @@ class Slot(NamedTuple):
         return "" if self.part is None else f"_{self.part}"
 
 
+LOOK_SLOTS = OPACITY_SLOT, FALLOFF_SLOT = Slot(None, LOOK[0]), Slot(None, LOOK[1])
+
+
 @cache
 def slots(structure: Structure) -> tuple[Slot, ...]:
     """What a layer's row of numbers holds, in order: opacity, falloff, then each part's smoothness, paint, shape."""
     own = (Slot(index, parameter) for index, part in enumerate(structure) for parameter in part.parameters)
-    return (*(Slot(None, parameter) for parameter in LOOK), *own)
+    return (*LOOK_SLOTS, *own)
 
 
 @cache

@@ -14,7 +14,7 @@ from skimage.morphology import convex_hull_image
 
 from ..arrays import BoolArray, Float64Array
 from ..blend import INTERSECTION, SUBTRACTION, UNION
-from ..layer import LOOK, Slot, row_width
+from ..layer import FALLOFF_SLOT, OPACITY_SLOT, row_width
 from ..paints import FLAT
 from ..render.tensors import Group
 from .arcs import Arc, arcs
@@ -276,9 +276,8 @@ class Area:
 
     def opening(self, too_much: float = 1.0) -> Opening:
         """A place for its first shape; by how much it matters what that covers too much."""
-        opacity, edge = (Slot(None, parameter) for parameter in LOOK)
         alpha = self.overlay.opacity * float(self.overlay.color[3] if len(self.overlay.color) == 4 else 1.0)
-        looks = {opacity: torch.tensor([[alpha]]), edge: torch.zeros(1, 1)}
+        looks = {OPACITY_SLOT: torch.tensor([[alpha]]), FALLOFF_SLOT: torch.zeros(1, 1)}
         matters = self.known * torch.where(self.inside > 0, 1.0, too_much)
         mask = Mask(matters, self.inside, 0.0)
         return Opening(Group((), torch.tensor([0]), looks), 0, "", self.color, mask)

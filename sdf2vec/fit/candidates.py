@@ -20,7 +20,7 @@ from ..arrays import IntArray
 from ..blend import JOINS, SHARPEST, SUBTRACTION
 from ..deferred import deferred
 from ..expr import const, var, vec3, vec4
-from ..layer import JOIN, LOOK, Part, Slot, Structure, slots
+from ..layer import FALLOFF_SLOT, JOIN, OPACITY_SLOT, Part, Slot, Structure, slots
 from ..lower.torch import Tensors, compile_torch
 from ..paints import BASE, FLAT
 from ..render.tensors import Group
@@ -171,8 +171,7 @@ def _closed_up(slot: Slot, index: int) -> Slot:
 
 def alone(order: torch.Tensor, color: torch.Tensor, falloff: float, around: Surroundings) -> list[Opening]:
     """Where a layer begins anew in a colour [1, 3]: so that no more is covered than wanted, or all that is."""
-    opacity, edge = (Slot(None, parameter) for parameter in LOOK)
-    looks = {opacity: torch.ones(1, 1), edge: torch.full((1, 1), falloff)}
+    looks = {OPACITY_SLOT: torch.ones(1, 1), FALLOFF_SLOT: torch.full((1, 1), falloff)}
     near = _opening(Group((), order, looks), 0, "", color, around)
     return [near, Opening(near.layer, 0, "", color, near.mask.eager())]
 

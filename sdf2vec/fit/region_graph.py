@@ -54,7 +54,7 @@ class Regions:
             cores[inside] = number
         is_step = steps(pixels, cores)
         flat = [inside for inside, step in zip(flat, is_step, strict=True) if not step]
-        cores = np.concatenate([[0], np.where(is_step, 0, np.cumsum(~is_step))])[cores]
+        cores = _left(cores, is_step)
         colors = np.array([np.median(pixels[inside], axis=0) for inside in flat]).reshape(-1, pixels.shape[2])
         labels, sure, slopes = _shared_out(pixels, cores, colors)
         return cls(labels, sure, slopes, colors, np.full(len(colors), EXACT)).merged()
@@ -122,10 +122,8 @@ class Regions:
 
     def hidden(self, chosen: BoolArray) -> Regions:
         """The same where some [R] are no longer seen: it is not known what is there."""
-        numbers = np.concatenate([[0], np.where(chosen, 0, np.cumsum(~chosen))])
-        return replace(
-            self, labels=numbers[self.labels], colors=self.colors[~chosen], doubts=self.doubts[~chosen]
-        )
+        labels = _left(self.labels, chosen)
+        return replace(self, labels=labels, colors=self.colors[~chosen], doubts=self.doubts[~chosen])
 
     def merged(self) -> Regions:
         """The same with neighbours of one colour made one, the likest first."""
@@ -175,6 +173,11 @@ def _is_flat(colors: Float64Array) -> bool:
     """Whether most colours [P, C] are one."""
     away = np.abs(colors - np.median(colors, axis=0)).max(axis=1)
     return float(np.mean(away <= EVEN / 2)) >= MOSTLY
+
+
+def _left(labels: IntArray, gone: BoolArray) -> IntArray:
+    """Numbers from 1 [H, W] without some [R], the rest in their order."""
+    return np.asarray(np.concatenate([[0], np.where(gone, 0, np.cumsum(~gone))])[labels])
 
 
 def connected(chosen: BoolArray, alike: Callable[[Part, Part], BoolArray]) -> IntArray:

@@ -64,8 +64,8 @@ class Shade(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class Shading:
-    """The regions of premultiplied pixels, by number from 1, 0 for none [H, W], where these are scaled down; and what
-    they are painted with.
+    """The regions of premultiplied pixels, by number from 1, 0 for none [H, W], where these are scaled down; what they
+    are painted with; and where these pixels are even [H, W].
 
     Parts of one colour or gradient are one region, wherever they are.
     """
@@ -73,20 +73,22 @@ class Shading:
     pixels: Float32Array
     labels: IntArray
     shades: tuple[Shade, ...]
+    calm: BoolArray
 
     @classmethod
     def of(cls, pixels: Float32Array) -> Shading | None:
         """That of pixels [H, W, C]; None where no region of them is a gradient with sharp edges."""
-        labels, shades = _regions(scaled(pixels, LOOKED).permute(1, 2, 0).numpy())
-        found = cls(pixels, labels, tuple(shades))
+        small = scaled(pixels, LOOKED).permute(1, 2, 0).numpy()
+        calm = even(small)
+        labels, shades = _regions(small, calm)
+        found = cls(pixels, labels, tuple(shades), calm)
         return found if found.graded else None
 
     @cached_property
     def graded(self) -> list[int]:
         """The numbers of the regions that are gradients with sharp edges."""
-        numbers = [number for number, shade in enumerate(self.shades, 1) if not shade.is_flat]
-        calm = even(scaled(self.pixels, LOOKED).permute(1, 2, 0).numpy()) if numbers else None
-        return [number for number in numbers if calm is not None and _is_sharp(self.labels, number, calm)]
+        numbers = (number for number, shade in enumerate(self.shades, 1) if not shade.is_flat)
+        return [number for number in numbers if _is_sharp(self.labels, number, self.calm)]
 
     @cached_property
     def nearest(self) -> IntArray:
@@ -198,11 +200,13 @@ def _is_sharp(labels: IntArray, number: int, calm: BoolArray) -> bool:
 # --- regions --------------------------------------------------------------------------------------------------
 
 
-def _regions(pixels: Float32Array) -> tuple[IntArray, list[Shade]]:
-    """The regions of a picture [H, W, C] that are planes, by number from 1, and what these are, the largest first."""
+def _regions(pixels: Float32Array, calm: BoolArray) -> tuple[IntArray, list[Shade]]:
+    """The regions of a picture [H, W, C] that are planes, by number from 1, and what these are, the largest first;
+    `calm`: where it is even [H, W].
+    """
     labels, shades = np.zeros(pixels.shape[:2], np.int64), list[Shade]()
     x, y = np.broadcast_arrays(*_places(pixels.shape[:2]))
-    for inside in _planes(pixels):
+    for inside in _planes(pixels, calm):
         shade = _shade(x[inside], y[inside], pixels[inside])
         if shade is None:
             continue
@@ -219,16 +223,14 @@ def _regions(pixels: Float32Array) -> tuple[IntArray, list[Shade]]:
     return labels, shades
 
 
-def _planes(pixels: Float32Array) -> Iterator[BoolArray]:
+def _planes(pixels: Float32Array, calm: BoolArray) -> Iterator[BoolArray]:
     """Masks [H, W] of connected pixels of a picture where colours hardly bend, and change the same way; the largest
     first.
     """
     if min(pixels.shape[:2]) < SMALLEST:
         return
     slopes = np.concatenate([np.gradient(pixels, axis=axis) for axis in (0, 1)], axis=2)
-    parts = connected(
-        even(pixels), lambda one, other: np.abs(slopes[one] - slopes[other]).max(axis=2) <= BENT
-    )
+    parts = connected(calm, lambda one, other: np.abs(slopes[one] - slopes[other]).max(axis=2) <= BENT)
     yield from largest(parts, LEAST)
 
 

@@ -8,7 +8,7 @@ from typing import NamedTuple
 
 import torch
 
-from ..layer import LOOK, Slot
+from ..layer import FALLOFF_SLOT, OPACITY_SLOT
 from ..paints import BASE
 from ..render.tensors import Group, SceneTensors
 from .descents import FEW, JOINT, Sizes, descended
@@ -28,7 +28,6 @@ SEEN = 0.3  # of it, at least: the rest lies under other layers
 FAINTEST, STRONGEST = 0.02, 0.95  # opacity
 CLEAR = 0.1  # of what is below, by which an opacity is told
 TINY = 1e-9
-OPACITY, FALLOFF = (Slot(None, parameter) for parameter in LOOK)
 
 
 @torch.no_grad()
@@ -94,10 +93,7 @@ def _shadow(scene: SceneTensors, order: int, sizes: Sizes) -> Shadow:
 def _cast(layer: Group, around: Surroundings, place: int) -> Shadow:
     """What a layer casts at a place of the draw order."""
     through, missing = around.light - around.dark, around.residual.flatten(1)
-    soft = [
-        replace(layer, values={**layer.values, FALLOFF: torch.full_like(layer.falloff, each)})
-        for each in FALLOFFS
-    ]
+    soft = [layer.setting(FALLOFF_SLOT, each) for each in FALLOFFS]
     covers = around.covers(layer.structure, torch.cat([layer.rows(), *(each.rows() for each in soft)]))
     beyond = covers[0] < NEARBY  # its own edge may be off by parts of a pixel
     covers = covers[1:] * beyond
@@ -129,4 +125,4 @@ def _colored(layer: Group, change: torch.Tensor, under: torch.Tensor) -> Group:
         slot: color.expand_as(value).clone() if slot.parameter is BASE else value
         for slot, value in layer.values.items()
     }
-    return replace(layer, values={**values, OPACITY: torch.full_like(layer.opacity, opacity)})
+    return replace(layer, values=values).setting(OPACITY_SLOT, opacity)

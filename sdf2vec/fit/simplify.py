@@ -15,7 +15,7 @@ import torch
 from ..expr import const
 from ..graph import scalarize
 from ..kind import SMALLEST
-from ..layer import JOIN, LOOK, Part, Slot, slots
+from ..layer import FALLOFF_SLOT, JOIN, OPACITY_SLOT, Part, Slot, slots
 from ..lower.torch import Tensors, compile_torch
 from ..paints import BASE, FLAT
 from ..render.tensors import Group, SceneTensors
@@ -202,7 +202,7 @@ def _upright(layer: Group, view: View) -> Iterator[Change]:
         quarters = round(float(turn) / (math.pi / 2))
         if abs(float(turn) - quarters * math.pi / 2) > UPRIGHT:
             continue
-        turned = _with(layer, slot, 0.0)
+        turned = layer.setting(slot, 0.0)
         yield (_sides_swapped(turned, slot.part) if quarters % 2 else turned), (slot,)
 
 
@@ -221,15 +221,13 @@ def _is_extent(slot: Slot) -> bool:
 
 def _opaque(layer: Group, view: View) -> Iterator[Change]:
     if float(layer.opacity) >= NEARLY_OPAQUE:
-        slot = Slot(None, LOOK[0])
-        yield _with(layer, slot, 1.0), (slot,)
+        yield layer.setting(OPACITY_SLOT, 1.0), (OPACITY_SLOT,)
 
 
 def _sharp(layer: Group, view: View) -> Iterator[Change]:
-    slot = Slot(None, LOOK[1])
     pixel = 1.0 / min(view.target.shape[1:])
     if float(layer.falloff) <= SOFTEST * pixel or layer.structure[0].paint != FLAT:
-        yield _with(layer, slot, 0.0), (slot,)
+        yield layer.setting(FALLOFF_SLOT, 0.0), (FALLOFF_SLOT,)
 
 
 def _joined_sharply(layer: Group, view: View) -> Iterator[Change]:
@@ -242,7 +240,7 @@ def _joined_sharply(layer: Group, view: View) -> Iterator[Change]:
 def _unrounded(layer: Group, view: View) -> Iterator[Change]:
     for slot in layer.values:
         if slot.part is not None and slot.parameter.name == "corner_radius":
-            yield _with(layer, slot, 0.0), (slot,)
+            yield layer.setting(slot, 0.0), (slot,)
 
 
 def _straight(layer: Group, view: View) -> Iterator[Change]:
@@ -250,16 +248,7 @@ def _straight(layer: Group, view: View) -> Iterator[Change]:
     pixel = 1.0 / min(view.target.shape[1:])
     for slot, tensor in layer.values.items():
         if slot.part is not None and slot.parameter.name == "sagitta" and abs(float(tensor)) <= BENT * pixel:
-            yield _with(layer, slot, 0.0), (slot,)
-
-
-def _with(layer: Group, changed: Slot, value: float) -> Group:
-    """The layer with one number."""
-    values = {
-        slot: torch.full_like(tensor, value) if slot == changed else tensor
-        for slot, tensor in layer.values.items()
-    }
-    return Group(layer.structure, layer.order, values)
+            yield layer.setting(slot, 0.0), (slot,)
 
 
 CHANGES: tuple[Propose, ...] = (

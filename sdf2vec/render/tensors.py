@@ -65,6 +65,11 @@ class Group:
         values = {slot: change(tensor) for slot, tensor in self.values.items()}
         return Group(self.structure, change(self.order), values)
 
+    def setting(self, slot: Slot, value: float) -> Group:
+        """The layers with one number in a slot."""
+        values = {**self.values, slot: torch.full_like(self.values[slot], value)}
+        return Group(self.structure, self.order, values)
+
     def joined(self, other: Group) -> Group:
         """The rows of both, this group's first."""
         values = {slot: torch.cat([tensor, other.values[slot]]) for slot, tensor in self.values.items()}
