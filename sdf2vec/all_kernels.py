@@ -5,14 +5,29 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 
 from .blend import COMPOSITING
-from .fit import descent_kernels, difference_kernels, flip_kernels, normal_kernels, ssim_kernels
+from .fit import (
+    descent_kernels,
+    difference_kernels,
+    flip_kernels,
+    normal_kernels,
+    ssim_kernels,
+    stacking_kernels,
+)
 from .kernel_cache import Assembly, Kernel
 from .layer import Part
 from .paints import PAINTS
 from .render import kernels, tiling
 from .shapes import KINDS
 
-LOOPS = (tiling, difference_kernels, ssim_kernels, flip_kernels, normal_kernels, descent_kernels)
+LOOPS = (
+    tiling,
+    difference_kernels,
+    ssim_kernels,
+    flip_kernels,
+    normal_kernels,
+    descent_kernels,
+    stacking_kernels,
+)
 
 
 def all_kernels() -> Iterator[tuple[str, Sequence[Assembly]]]:

@@ -3,14 +3,15 @@
 from __future__ import annotations
 
 import operator
+from collections.abc import Sequence
 from dataclasses import replace
 from functools import partial
 
 import torch
 
-from ..render.reference import layers_at
 from ..render.tensors import SceneTensors
-from .surroundings import View, error_of, points_of, some
+from .stacking import Stack
+from .surroundings import View, covers_of, some
 
 MOVED = 0.98  # of the error, at most, after a layer was moved
 UNSEEN = 0.5 / 255  # coverage
@@ -39,31 +40,40 @@ def without_all(scene: SceneTensors, orders: list[int]) -> SceneTensors:
 @torch.no_grad()
 def reordered(scene: SceneTensors, view: View) -> SceneTensors:
     """The scene with each layer at the place of the draw order where the error is least."""
-    error, beside = error_of(scene, view), touching(scene, view)
-    for order in range(scene.layer_count):
-        start = scene
-        touched = [other - (other > order) for other in beside[order].nonzero()[:, 0].tolist()]
-        for place in _other_places(order, touched):
-            tried = moved(start, order, place)
-            found = error_of(tried, view)
+    stack, beside = Stack(scene, view), touching(scene, view)
+    layers = list(range(scene.layer_count))
+    (error,) = stack.errors([layers])
+    for order in range(len(layers)):
+        touched = [place for place, other in enumerate(layers) if beside[layers[order], other]]
+        places = _other_places(order, [place - (place > order) for place in touched])
+        tried = [_moved(layers, order, place) for place in places]
+        for each, found in zip(tried, stack.errors(tried), strict=True):
             if found < MOVED * error:
-                scene, error, beside = tried, found, touching(tried, view)
-    return scene
+                layers, error = each, found
+    return _ordered(scene, layers)
 
 
 def moved(scene: SceneTensors, order: int, place: int) -> SceneTensors:
     """The scene with one layer at another place of the draw order."""
-    others = [other for other in range(scene.layer_count) if other != order]
-    others.insert(place, order)
-    places = torch.tensor(others).argsort()
+    return _ordered(scene, _moved(range(scene.layer_count), order, place))
+
+
+def _moved(layers: Sequence[int], order: int, place: int) -> list[int]:
+    """Layers from below with one of them at another place."""
+    others = [layer for each, layer in enumerate(layers) if each != order]
+    return [*others[:place], layers[order], *others[place:]]
+
+
+def _ordered(scene: SceneTensors, layers: Sequence[int]) -> SceneTensors:
+    """The scene with its layers in an order, by their places now, from below."""
+    places = torch.tensor(layers, dtype=torch.int64).argsort()
     groups = [replace(group, order=places[group.order]) for group in scene.groups]
     return replace(scene, groups=groups)
 
 
 def touching(scene: SceneTensors, view: View) -> torch.Tensor:
     """Which layers are seen in the same places, [N, N] in draw order."""
-    covers, _ = layers_at(scene, *points_of(scene, view))
-    seen = (covers > UNSEEN).float()
+    seen = (covers_of(scene, view) > UNSEEN).float()
     return ((seen @ seen.T) > 0).fill_diagonal_(False)
 
 

@@ -30,12 +30,13 @@ RISE, SOFTER = (
     4.0,
 )  # times the error before, at most, of one shape in the place of several; pixels, of edges from which all descend
 RETHOUGHT = 2  # colours whose layers are found anew in a round, at most
+MUCH = 10**-2.7  # mean squared error, 27 dB, of a scene that may be other than it was thought to be
 
 
 def rethought(scene: SceneTensors, sizes: Sizes, search: Search, floor: float) -> SceneTensors:
     """The scene with one shape in the place of some of a colour, found now that others are there, if that is better."""
     error = error_of(scene, sizes.joint)
-    if not 1 < scene.layer_count <= FEW or error <= floor:
+    if not 1 < scene.layer_count <= FEW or error <= max(MUCH, floor):
         return scene
     for orders in _alike(scene, sizes.search)[:RETHOUGHT]:
         made = _anew(scene, orders, sizes, search, floor)

@@ -8,7 +8,7 @@ from ..kernel_cache import kernel
 from ..lower.loops import F32, F64, I32, I64, ZERO, call, f32, inlined
 from ..render.tiling import PIXELS, TILE
 
-LEAST_SLOPE = f32(1e-12)  # squared: what is less changes nothing
+LEAST_SLOPE = f32(1e-12)  # squares in a tile: what is less changes nothing
 
 
 @inlined
@@ -49,12 +49,11 @@ def dim_slopes(layers, widths, light, sloped):
 @inlined
 def changes(slopes, u, width, channels):
     """Whether a number of a layer changes anything in a tile."""
-    most = ZERO
+    total = ZERO
     for c in range(channels):
-        for i in range(PIXELS):
-            slope = slopes[channels + c * width + u, i]
-            most = max(most, slope * slope)
-    return most > LEAST_SLOPE
+        plane = slopes[channels + c * width + u]
+        total += dot(plane, plane)
+    return total > LEAST_SLOPE
 
 
 @inlined

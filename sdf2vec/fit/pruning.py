@@ -5,14 +5,14 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import NamedTuple
 
-from ..render.reference import layers_at
 from ..render.tensors import SceneTensors
 from .descents import AFTER, FEW, Sizes, descended, each_improved, softened
 from .description import is_longer
 from .draw_order import reordered, touching, without, without_all
 from .joining import Search
 from .least_squares import count_numbers
-from .surroundings import error_of, local_error, points_of
+from .stacking import Stack
+from .surroundings import covers_of, error_of, local_error
 
 FLOOR = 10**-4.4  # mean squared error, 44 dB: below it nothing is missing
 NEEDLESS = 1.05  # how much the error may rise by a layer taken out, after a descent
@@ -61,8 +61,7 @@ def _bare(
 
     Together they may be the soft edge of that one.
     """
-    covers, _ = layers_at(scene, *points_of(scene, sizes.joint))
-    areas, beside = covers.sum(1), touching(scene, sizes.joint)
+    areas, beside = covers_of(scene, sizes.joint).sum(1), touching(scene, sizes.joint)
     for order in areas.argsort(descending=True).tolist():
         smaller = (beside[order] & (areas < areas[order])).nonzero()[:, 0].tolist()
         if len(smaller) > 1:
@@ -102,10 +101,11 @@ def _fewer(
     scene: SceneTensors, sizes: Sizes, search: Search, worst: float, hope: Hope
 ) -> tuple[SceneTensors, float] | None:
     """The scene without one of the layers that matter least, and its error, if that is at most the worst."""
-    rest = [without(scene, order) for order in range(scene.layer_count)]
-    tried = [(error_of(fewer, sizes.joint), fewer) for fewer in rest]
-    least = sorted(tried, key=lambda pair: pair[0])[: hope.tried]
-    hopeful = [pair for pair in least if pair[0] <= hope.rise * worst]
+    errors = Stack(scene, sizes.joint).errors_without_each()
+    least = sorted(range(len(errors)), key=errors.__getitem__)[: hope.tried]
+    hopeful = [
+        (errors[order], without(scene, order)) for order in least if errors[order] <= hope.rise * worst
+    ]
     for error, fewer in sorted(hopeful, key=lambda pair: count_numbers(pair[1])):
         if error > worst and fewer.layer_count:
             fewer, error = _settled(fewer, sizes, search, worst, hope)

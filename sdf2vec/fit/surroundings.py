@@ -41,16 +41,35 @@ def points_of(scene: SceneTensors, view: View) -> Points:
     return x, y, pixel
 
 
+def covers_of(scene: SceneTensors, view: View) -> torch.Tensor:
+    """Coverage [N, P] of the layers of a scene, in draw order, at the pixels of a picture."""
+    blocks = Blocks.of(points_of(scene, view))
+    found = torch.empty(scene.layer_count, blocks.points)
+    for group in scene.groups:
+        found[group.order] = covers(group.structure, scene.compositing, group.rows(), blocks)
+    return found
+
+
 def residual_of(scene: SceneTensors, view: View) -> torch.Tensor:
     """How far a scene is from a picture, weighted, [C, H, W]; differentiable."""
-    wrong = _drawn(scene, view) - view.target
+    (channels, height, width), samples = view.target.shape, view.samples
+    return wrong_with(fused.composite(scene, samples * width, samples * height, channels), view)
+
+
+def wrong_with(drawn: torch.Tensor, view: View) -> torch.Tensor:
+    """How far what is drawn is from a picture, weighted, [..., C, H, W], of as many samples [..., C, H', W']."""
+    wrong = _pooled(drawn, view.samples) - view.target
     return wrong if view.weights is None else wrong * view.weights
 
 
 def _drawn(scene: SceneTensors, view: View) -> torch.Tensor:
     """A scene at the size of a picture and with its channels, [C, H, W]; differentiable."""
     (channels, height, width), samples = view.target.shape, view.samples
-    drawn = fused.composite(scene, samples * width, samples * height, channels)
+    return _pooled(fused.composite(scene, samples * width, samples * height, channels), samples)
+
+
+def _pooled(drawn: torch.Tensor, samples: int) -> torch.Tensor:
+    """What is drawn by so many samples across a pixel."""
     return drawn if samples == 1 else torch.nn.functional.avg_pool2d(drawn, samples)
 
 
