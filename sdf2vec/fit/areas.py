@@ -53,9 +53,9 @@ class Outlined:
     off: float
     worst: float
     missed: float
-    bitten: bool
     soft: bool
     more: tuple[Group, ...] = ()
+    bitten: bool = False
 
     @property
     def score(self) -> float:
@@ -204,21 +204,19 @@ class Area:
         """How well some layers cover it that lie on each other."""
         first, *more = layers
         wrong = (self.cover(layers) * self.known - self.inside).abs()
-        return replace(self._judged(first, wrong, False), more=tuple(more))
+        return replace(self._judged(first, wrong), more=tuple(more))
 
     def all_outlined(self, layers: Sequence[Group]) -> list[Outlined]:
         """The same of some layers of one structure, each alone."""
         wrong = (_covers(layers, self.around) * self.known - self.inside).abs()
-        return [
-            self._judged(layer, own, self._is_bitten(layer)) for layer, own in zip(layers, wrong, strict=True)
-        ]
+        return [self._judged(layer, own) for layer, own in zip(layers, wrong, strict=True)]
 
-    def _judged(self, layer: Group, wrong: torch.Tensor, bitten: bool) -> Outlined:
+    def _judged(self, layer: Group, wrong: torch.Tensor) -> Outlined:
         """A layer that covers points wrongly by so much [P]."""
         off, (nearest, lengths) = float(wrong.sum()), self.sides
         long = lengths.where(lengths >= LEAST_SIDE, math.inf)  # of short ones the mean says little
         worst = float((wrong.new_zeros(len(lengths)).index_add_(0, nearest, wrong) / long).max())
-        return Outlined(layer, self.overlay, off / self.edge, worst, off / self._size, bitten, self.soft)
+        return Outlined(layer, self.overlay, off / self.edge, worst, off / self._size, self.soft)
 
     @property
     def _size(self) -> float:
@@ -232,7 +230,7 @@ class Area:
         squares = ndimage.binary_opening(wrong, np.ones((pixels, pixels)))
         return float(squares.sum()) < GROSSLY * self._size
 
-    def _is_bitten(self, layer: Group) -> bool:
+    def is_bitten(self, layer: Group) -> bool:
         """Whether a shape that is cut out of the first goes beyond its edge, or one that leaves a part of it does."""
         joins = [part.join for part in layer.structure]
         if INTERSECTION in joins:
