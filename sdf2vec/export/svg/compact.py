@@ -29,7 +29,7 @@ from .visibility import LayerSamples, contrasts, layers_at
 
 # User units or, if that is more, pixels of the fitted picture that a traced contour may be off.
 TOLERANCE = 0.5, 0.15
-STRAYED = 0.2  # of a contour's tolerance, that curves are off: the root of the mean square
+STRAYED = 0.5  # of a contour's tolerance, that curves are off: the root of the mean square
 RECTANGLE, LINE = 4, 2  # points
 THIN = 1.0  # user units that a rectangle is wide where it is a line
 ROUNDED = 1.0 / 12.0  # mean squared change of a number that is rounded to a whole one

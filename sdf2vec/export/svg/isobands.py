@@ -20,7 +20,7 @@ FEWEST = 96  # grid cells along the longest side of a small shape
 MAX_CELLS = 2048  # grid cells along any side
 WORK = 1 << 23  # grid cells × shapes: coarser for large unions
 FEWEST_BANDS, MOST_BANDS = 3, 24
-BANDS_A_PIXEL = 1.4
+BANDS_A_PIXEL = 1.2
 
 find_contours: Callable[[Float64Array, float], list[Points]] = deferred("skimage.measure", "find_contours")
 

@@ -125,7 +125,7 @@ class Painter:
         falloff = layer.falloff * canvas.unit
         wide = self.plan.rings and (falloff * canvas.pixels > NARROW or layer.is_patch)
         apart = wide and len(parts) == 1  # no two paths overlap: each can have the layer's opacity itself
-        tolerance = min(max(least, 0.15 * falloff / max(1, len(parts[0][1]))), LOOSEST)
+        tolerance = min(max(least, 0.1 * falloff / max(1, len(parts[0][1]))), LOOSEST)
         path = straight_path if wide else smooth_path
         own = layer.opacity if apart else 1.0
         figures = tuple(

@@ -94,11 +94,11 @@ def test_bands_begin_half_way_between_their_coverages():
 
 
 def test_the_number_of_bands():
-    """Steps of 1 / n of 255 levels are off by that over the root of 12; an edge of 5 pixels takes 7 bands."""
+    """Steps of 1 / n of 255 levels are off by that over the root of 12; an edge of 5 pixels takes 6 bands."""
     assert band_count(0.0, 1.0) == FEWEST_BANDS
     assert band_count(1.0, 1e-3) == MOST_BANDS
     assert band_count(1.0, 255 / 12**0.5 / 10.5) == 10
-    assert band_count(1.0, 1e-3, 5.0) == 7
+    assert band_count(1.0, 1e-3, 5.0) == 6
 
 
 def test_contours_of_a_disc_lie_on_its_edge():
