@@ -123,7 +123,7 @@ def _fit(span: Points) -> tuple[Points, float]:
     points = span[:, 0] + 1j * span[:, 1]
     start, end = points[0], points[-1]
     chord = np.concatenate([[0.0], np.cumsum(np.abs(np.diff(points)))])
-    t = chord / chord[-1]
+    t = chord / max(float(chord[-1]), TINY)
     for _ in range(ROUNDS):
         s = 1.0 - t
         one, two = 3.0 * t * s * s, 3.0 * t * t * s
