@@ -28,7 +28,7 @@ from .union_gradient import fill_of
 from .visibility import LayerSamples, contrasts, layers_at
 
 # User units or, if that is more, pixels of the fitted picture that a traced contour may be off.
-TOLERANCE = 0.5, 0.15
+TOLERANCE = 0.5, 0.1
 STRAYED = 0.5  # of a contour's tolerance, that curves are off: the root of the mean square
 RECTANGLE, LINE = 4, 2  # points
 THIN = 1.0  # user units that a rectangle is wide where it is a line
