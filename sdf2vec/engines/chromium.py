@@ -1,7 +1,7 @@
 """Pages and SVG drawn by Chromium, headless, through Playwright; the browser is the system's own.
 
-One browser is started per process and lives until the process ends. Pages are given their files from memory;
-nothing is served on a port and nothing else can be reached.
+One browser is started per process and lives until the process ends, or until it no longer draws. Pages are given their
+files from memory; nothing is served on a port and nothing else can be reached.
 """
 
 import atexit
@@ -14,7 +14,7 @@ from contextlib import contextmanager
 from functools import cache
 from typing import Any
 
-from playwright.sync_api import BrowserContext, Page, Route, sync_playwright
+from playwright.sync_api import BrowserContext, Page, Playwright, Route, TimeoutError, sync_playwright
 
 from sdf2vec.engines.engine import EngineError, Picture, pixels_of, require_drawable, with_viewport
 
@@ -59,12 +59,24 @@ def probe() -> BrowserContext:
         raise EngineError("Chromium is not installed")
     profile = tempfile.mkdtemp(prefix="sdf2vec-chromium-")
     atexit.register(shutil.rmtree, profile, ignore_errors=True)
-    playwright = sync_playwright().start()
-    atexit.register(playwright.stop)
     options: dict[str, Any] = {"executable_path": program, "headless": True, "args": list(ARGUMENTS)}
-    browser = playwright.chromium.launch_persistent_context(profile, device_scale_factor=1, **options)
+    browser = _playwright().chromium.launch_persistent_context(profile, device_scale_factor=1, **options)
     atexit.register(browser.close)
     return browser
+
+
+@cache
+def _playwright() -> Playwright:
+    playwright = sync_playwright().start()
+    atexit.register(playwright.stop)
+    return playwright
+
+
+def renew() -> None:
+    """Ends the browser, if there is one: the next page gets a new one."""
+    if probe.cache_info().currsize:
+        probe().close()
+        probe.cache_clear()
 
 
 def render(svg: str, width: int, height: int) -> Picture:
@@ -104,6 +116,9 @@ def opened(files: Mapping[str, str | bytes], width: int, height: int) -> Iterato
         page.route("**/*", lambda route: _answer(route, files))
         page.goto(ORIGIN, wait_until="load")
         yield page
+    except TimeoutError:  # of Playwright: a browser that has stopped drawing keeps to that
+        renew()
+        raise
     finally:
         page.close()
 

@@ -1,6 +1,8 @@
 """Pages in Chromium."""
 
 import numpy as np
+import pytest
+from playwright.sync_api import TimeoutError
 
 from sdf2vec.engines import chromium
 
@@ -41,3 +43,16 @@ class TestChromiumPages:
         ):
             assert first.evaluate("document.body.textContent") == "a"
             assert b.evaluate("document.body.textContent") == "b"
+
+
+def test_after_a_page_that_stands_still_there_is_a_new_browser(require_engine):
+    require_engine("chromium")
+    first = chromium.probe()
+    with (
+        pytest.raises(TimeoutError),
+        chromium.opened({"index.html": "<p>"}, 50, 50) as page,
+    ):
+        page.locator("#nothing").screenshot(timeout=200)
+    with chromium.opened({"index.html": "<p>"}, 50, 50) as page:
+        assert chromium.screenshot(page).shape == (50, 50, 4)
+    assert chromium.probe() is not first

@@ -23,6 +23,12 @@ from tests.operations import MEANINGS, expected
 from tests.scenes import FIRST_COMPACT, random_scene
 
 
+@pytest.fixture(scope="module", autouse=True)
+def browser_of_its_own():
+    """After hundreds of other pages Chromium may draw no frame of a canvas for minutes."""
+    chromium.renew()
+
+
 @pytest.fixture
 def opened(require_engine):
     require_engine("chromium")
