@@ -40,40 +40,35 @@ def without_all(scene: SceneTensors, orders: list[int]) -> SceneTensors:
 @torch.no_grad()
 def reordered(scene: SceneTensors, view: View) -> SceneTensors:
     """The scene with each layer at the place of the draw order where the error is least."""
-    stack, beside = Stack(scene, view), touching(scene, view)
+    stack, beside = Stack(scene, view), touching(covers_of(scene, view))
     layers = list(range(scene.layer_count))
     (error,) = stack.errors([layers])
     for order in range(len(layers)):
         touched = [place for place, other in enumerate(layers) if beside[layers[order], other]]
         places = _other_places(order, [place - (place > order) for place in touched])
-        tried = [_moved(layers, order, place) for place in places]
+        tried = [moved(layers, order, place) for place in places]
         for each, found in zip(tried, stack.errors(tried), strict=True):
             if found < MOVED * error:
                 layers, error = each, found
-    return _ordered(scene, layers)
+    return ordered(scene, layers)
 
 
-def moved(scene: SceneTensors, order: int, place: int) -> SceneTensors:
-    """The scene with one layer at another place of the draw order."""
-    return _ordered(scene, _moved(range(scene.layer_count), order, place))
-
-
-def _moved(layers: Sequence[int], order: int, place: int) -> list[int]:
+def moved(layers: Sequence[int], order: int, place: int) -> list[int]:
     """Layers from below with one of them at another place."""
     others = [layer for each, layer in enumerate(layers) if each != order]
     return [*others[:place], layers[order], *others[place:]]
 
 
-def _ordered(scene: SceneTensors, layers: Sequence[int]) -> SceneTensors:
+def ordered(scene: SceneTensors, layers: Sequence[int]) -> SceneTensors:
     """The scene with its layers in an order, by their places now, from below."""
     places = torch.tensor(layers, dtype=torch.int64).argsort()
     groups = [replace(group, order=places[group.order]) for group in scene.groups]
     return replace(scene, groups=groups)
 
 
-def touching(scene: SceneTensors, view: View) -> torch.Tensor:
-    """Which layers are seen in the same places, [N, N] in draw order."""
-    seen = (covers_of(scene, view) > UNSEEN).float()
+def touching(covers: torch.Tensor) -> torch.Tensor:
+    """Which layers are seen in the same places, [N, N], from their coverage [N, P]."""
+    seen = (covers > UNSEEN).float()
     return ((seen @ seen.T) > 0).fill_diagonal_(False)
 
 

@@ -64,8 +64,8 @@ class SceneProblem:
 
     def __init__(self, scene: SceneTensors, view: View) -> None:
         self.scene, self.view = scene, view
-        self.channels, height, width = view.target.shape
-        self.sides = height, width = view.samples * height, view.samples * width  # in samples
+        self.channels = len(view.target)
+        self.sides = height, width = view.sampled
         rows, columns = -(-height // TILE), -(-width // TILE)
         x, y, pixel = canvas_axes(scene.size, columns * TILE, rows * TILE, width, height)
         self.pixel = float(pixel)

@@ -172,15 +172,15 @@ class Outlines:
     def _kept_or_found(self, area: Area, fine: Area) -> Outlined | None:
         name, near = fine.name, fine.near
         then, old = self.before.get(name, (b"", None))
-        tried = [area.outlined_together(old.all)] if old else []
+        tried = [replace(area.outlined_together(old.all), bitten=old.bitten)] if old else []
         good = [each for each in tried if each.is_good]
         if then != near or not good:
             found = best_outlined(area, fine, self.search)
-            good = [found, *good] if found and found.is_good else good
+            if found and found.is_good:
+                good = [replace(found, bitten=any(map(area.is_bitten, found.all))), *good]
             if not good:
                 return found
         best = min(good, key=lambda each: each.score)
-        best = replace(best, bitten=any(map(area.is_bitten, best.all)))
         self.before[name] = near, best
         return best
 

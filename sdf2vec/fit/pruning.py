@@ -61,7 +61,8 @@ def _bare(
 
     Together they may be the soft edge of that one.
     """
-    areas, beside = covers_of(scene, sizes.joint).sum(1), touching(scene, sizes.joint)
+    covers = covers_of(scene, sizes.joint)
+    areas, beside = covers.sum(1), touching(covers)
     for order in areas.argsort(descending=True).tolist():
         smaller = (beside[order] & (areas < areas[order])).nonzero()[:, 0].tolist()
         if len(smaller) > 1:

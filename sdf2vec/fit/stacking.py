@@ -20,11 +20,10 @@ from ..render.tiling import PIXELS
 from ..threads import in_threads
 from .laying import Blocks, entries
 from .stacking_kernels import stack_layers
-from .surroundings import View, wrong_with
+from .surroundings import View, residual_of_drawn
 
-KEPT = (
-    2**25
-)  # values of all layers that are kept, twice 128 MiB; of more some at a time, anew whenever they are wanted
+# values of all layers that are kept, twice 128 MiB; of more some at a time, anew whenever they are wanted
+KEPT = 2**25
 AT_ONCE = 2**21  # values of all pictures that are made at once
 
 
@@ -65,19 +64,18 @@ class Stack:
         images = np.empty((len(orders), len(self._blocks.x), self._channels, PIXELS), np.float32)
         for laying in self._layings():
             in_threads(stack_layers, images, places, lengths, *laying, self.scene.background.numpy())
-        height, width = (self.view.samples * side for side in self.view.target.shape[1:])
-        drawn = self._blocks.flat(images).unflatten(2, (height, width))
-        errors: list[float] = wrong_with(drawn, self.view).square().mean(dim=(1, 2, 3)).tolist()
+        drawn = self._blocks.flat(images).unflatten(2, self.view.sampled)
+        errors: list[float] = residual_of_drawn(drawn, self.view).square().mean(dim=(1, 2, 3)).tolist()
         return errors
 
     def _layings(self) -> Iterator[Laying]:
         """What all layers make of what is below them, blocks after blocks."""
         blocks = len(self._blocks.x)
-        step = KEPT // max(1, self.scene.layer_count * self._channels * PIXELS)
+        step = max(1, KEPT // max(1, self.scene.layer_count * self._channels * PIXELS))
         if step >= blocks:
             yield self._kept
         else:
-            yield from (self._laying(start, max(step, 1)) for start in range(0, blocks, max(step, 1)))
+            yield from (self._laying(start, step) for start in range(0, blocks, step))
 
     @cached_property
     def _kept(self) -> Laying:
@@ -99,7 +97,7 @@ class Stack:
 
     @cached_property
     def _blocks(self) -> Blocks:
-        height, width = (self.view.samples * side for side in self.view.target.shape[1:])
+        height, width = self.view.sampled
         x, y, pixel = canvas(self.scene, width, height)
         return Blocks.of((x, y, pixel))
 

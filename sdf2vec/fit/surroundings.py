@@ -34,6 +34,12 @@ class View(NamedTuple):
     weights: torch.Tensor | None
     samples: int = 1
 
+    @property
+    def sampled(self) -> tuple[int, int]:
+        """Its height and width in samples."""
+        height, width = self.target.shape[1:]
+        return self.samples * height, self.samples * width
+
 
 def points_of(scene: SceneTensors, view: View) -> Points:
     """The pixel centres of a picture on the scene's canvas."""
@@ -52,20 +58,24 @@ def covers_of(scene: SceneTensors, view: View) -> torch.Tensor:
 
 def residual_of(scene: SceneTensors, view: View) -> torch.Tensor:
     """How far a scene is from a picture, weighted, [C, H, W]; differentiable."""
-    (channels, height, width), samples = view.target.shape, view.samples
-    return wrong_with(fused.composite(scene, samples * width, samples * height, channels), view)
+    return residual_of_drawn(_sampled(scene, view), view)
 
 
-def wrong_with(drawn: torch.Tensor, view: View) -> torch.Tensor:
-    """How far what is drawn is from a picture, weighted, [..., C, H, W], of as many samples [..., C, H', W']."""
+def residual_of_drawn(drawn: torch.Tensor, view: View) -> torch.Tensor:
+    """The same [..., C, H, W] of what is drawn already, in samples [..., C, H', W']."""
     wrong = _pooled(drawn, view.samples) - view.target
     return wrong if view.weights is None else wrong * view.weights
 
 
 def _drawn(scene: SceneTensors, view: View) -> torch.Tensor:
     """A scene at the size of a picture and with its channels, [C, H, W]; differentiable."""
-    (channels, height, width), samples = view.target.shape, view.samples
-    return _pooled(fused.composite(scene, samples * width, samples * height, channels), samples)
+    return _pooled(_sampled(scene, view), view.samples)
+
+
+def _sampled(scene: SceneTensors, view: View) -> torch.Tensor:
+    """The same in samples."""
+    height, width = view.sampled
+    return fused.composite(scene, width, height, len(view.target))
 
 
 def _pooled(drawn: torch.Tensor, samples: int) -> torch.Tensor:

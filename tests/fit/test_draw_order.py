@@ -2,7 +2,7 @@
 
 import pytest
 
-from sdf2vec.fit.draw_order import moved, reordered
+from sdf2vec.fit.draw_order import moved, ordered, reordered
 from sdf2vec.render.tensors import from_scene, to_scene
 from sdf2vec.scene import Scene
 from tests.fit.drawn import (
@@ -35,7 +35,7 @@ def colors_of(tensors):
 def test_a_layer_is_moved_and_the_others_stay_in_order(order, place, found):
     """Two of them are of one structure, the third, between them, is not."""
     scene = from_scene(Scene(SIDE, SIDE, (FIRST, SECOND, THIRD), rgb(WHITE)))
-    assert colors_of(moved(scene, order, place)) == found
+    assert colors_of(ordered(scene, moved(range(scene.layer_count), order, place))) == found
     assert colors_of(scene) == "rbg"
 
 

@@ -26,6 +26,10 @@ def scene_of(compositing, channels):
     return Scene(WIDTH, HEIGHT, layers, ground, compositing)
 
 
+def noise(*channels):
+    return torch.rand(*channels, HEIGHT, WIDTH, generator=torch.Generator().manual_seed(1))
+
+
 def error_of(scene, order, view, channels):
     """That of the dense render of such layers only."""
     chosen = Scene(WIDTH, HEIGHT, tuple(scene.layers[i] for i in order), scene.background, scene.compositing)
@@ -42,9 +46,8 @@ def test_errors_are_those_of_such_scenes(compositing, channels, samples, is_weig
     """All at once, one block of pixels at a time, one picture at a time."""
     monkeypatch.setattr(stacking, "KEPT", kept)
     monkeypatch.setattr(stacking, "AT_ONCE", kept)
-    draw = torch.Generator().manual_seed(1)
-    target, weights = (torch.rand(*each, HEIGHT, WIDTH, generator=draw) for each in ((channels,), ()))
-    scene, view = scene_of(compositing, channels), View(target, weights if is_weighted else None, samples)
+    weights = noise() if is_weighted else None
+    scene, view = scene_of(compositing, channels), View(noise(channels), weights, samples)
     found = Stack(from_scene(scene), view).errors(ORDERS)
     assert found == pytest.approx([error_of(scene, order, view, channels) for order in ORDERS], rel=1e-4)
     if compositing == "over":
@@ -52,14 +55,14 @@ def test_errors_are_those_of_such_scenes(compositing, channels, samples, is_weig
 
 
 def test_errors_without_each_layer():
-    scene, view = scene_of("over", 3), View(torch.rand(3, HEIGHT, WIDTH), None)
+    scene, view = scene_of("over", 3), View(noise(3), None)
     orders = [[other for other in range(5) if other != order] for order in range(5)]
     wanted = [error_of(scene, order, view, 3) for order in orders]
     assert Stack(from_scene(scene), view).errors_without_each() == pytest.approx(wanted, rel=1e-4)
 
 
 def test_of_no_layers():
-    view = View(torch.rand(3, HEIGHT, WIDTH), None)
+    view = View(noise(3), None)
     bare = Stack(from_scene(Scene(WIDTH, HEIGHT, (), (0.4, 0.5, 0.6))), view)
     assert bare.errors_without_each() == []
     assert bare.errors([[]]) == pytest.approx([error_of(scene_of("over", 3), [], view, 3)], rel=1e-5)

@@ -1,4 +1,4 @@
-"""Closed contours as cubic Bézier curves: knots where the contour bends most, least squares in between."""
+"""Closed contours as lines and cubic Bézier curves: knots at corners, least squares in between."""
 
 from __future__ import annotations
 
