@@ -9,8 +9,8 @@ import mimetypes
 import shutil
 import tempfile
 import time
-from collections.abc import Iterator, Mapping
-from contextlib import contextmanager
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager, suppress
 from functools import cache
 from typing import Any
 
@@ -21,6 +21,7 @@ from sdf2vec.engines.engine import EngineError, Picture, pixels_of, require_draw
 PROGRAMS = ("chromium", "chromium-browser", "google-chrome", "google-chrome-stable")
 ORIGIN = "http://localhost/"  # a secure context, which WebGPU wants; requests never leave the process
 SECONDS = 60.0
+TIMES = 2  # that something is drawn: a browser may stop drawing, another seldom does so, too
 POLL = 20.0  # milliseconds between two looks at a page
 
 ARGUMENTS = (
@@ -89,12 +90,29 @@ def render(svg: str, width: int, height: int) -> Picture:
         EngineError: the SVG is refused.
     """
     sized = with_viewport(svg, width, height)
-    with opened({"index.html": IMAGE_PAGE, "picture.svg": sized}, width, height) as page:
-        try:
-            page.evaluate("document.getElementById('picture').decode()")
-        except Exception as error:  # Playwright's own error; its first line is the page's exception
-            raise EngineError(f"Chromium refuses the SVG: {_first_line(error)}", log=str(error)) from None
-        return screenshot(page)
+    return drawn({"index.html": IMAGE_PAGE, "picture.svg": sized}, width, height, _decoded)
+
+
+def _decoded(page: Page) -> Picture:
+    try:
+        page.evaluate("document.getElementById('picture').decode()")
+    except Exception as error:  # Playwright's own error; its first line is the page's exception
+        raise EngineError(f"Chromium refuses the SVG: {_first_line(error)}", log=str(error)) from None
+    return screenshot(page)
+
+
+def drawn(
+    files: Mapping[str, str | bytes], width: int, height: int, draw: Callable[[Page], Picture]
+) -> Picture:
+    """What `draw` makes of a page as `opened` shows it; where that stands still, of one in a new browser.
+
+    Raises:
+        EngineError: Chromium is missing, the size is out of range or that page stands still, too.
+    """
+    for _ in range(TIMES):
+        with suppress(TimeoutError), opened(files, width, height) as page:
+            return draw(page)
+    raise EngineError(f"Chromium has drawn nothing in {SECONDS:g} seconds")
 
 
 @contextmanager

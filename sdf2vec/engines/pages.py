@@ -9,7 +9,7 @@ from pathlib import Path
 
 from playwright.sync_api import Page
 
-from sdf2vec.engines.chromium import opened, probe, screenshot, wait_until
+from sdf2vec.engines.chromium import drawn, probe, screenshot, wait_until
 from sdf2vec.engines.engine import EngineError, Picture
 from sdf2vec.npm import NODE_MODULES
 
@@ -42,36 +42,43 @@ TWO_FRAMES = "new Promise((done) => requestAnimationFrame(() => requestAnimation
 def page(html: str, width: int, height: int) -> Picture:
     """The picture on the page that `sdf2vec.export.page` makes."""
     window = width + MARGIN, math.ceil((height + 1) / SHARE)
-    with opened({"index.html": html}, *window) as shown:
-        canvas = "document.querySelector('canvas')"
+    canvas = "document.querySelector('canvas')"
+
+    def draw(shown: Page) -> Picture:
         _wait_for(shown, canvas, width, height)
         return screenshot(shown, "canvas")[:height, :width]  # a fractional box is rounded up
+
+    return drawn({"index.html": html}, *window, draw)
 
 
 def image(address: str, width: int, height: int) -> Picture:
     """What an `<img>` with this address shows."""
-    with opened({"index.html": IMAGE.format(address=address)}, width, height) as shown:
-        return screenshot(shown)
+    return drawn({"index.html": IMAGE.format(address=address)}, width, height, screenshot)
 
 
 def element(module: str, width: int, height: int, scene: str | bytes) -> Picture:
     """A scene file, JSON or compact, in the element that a module defines."""
     files: dict[str, str | bytes] = {"index.html": ELEMENT, "sdf-image.js": module}
     files["picture.scene.json"] = scene
-    with opened(files, width, height) as shown:
-        _wait_for(
-            shown, "document.querySelector('sdf-image').shadowRoot?.querySelector('canvas')", width, height
-        )
+    canvas = "document.querySelector('sdf-image').shadowRoot?.querySelector('canvas')"
+
+    def draw(shown: Page) -> Picture:
+        _wait_for(shown, canvas, width, height)
         return screenshot(shown, "sdf-image")[:height, :width]
+
+    return drawn(files, width, height, draw)
 
 
 def material(module: str, width: int, height: int) -> Picture:
     """A rectangle with the three.js material that a module makes."""
-    html = MATERIAL.format(width=width, height=height)
-    with opened({"index.html": html, "material.js": module, **_three_modules()}, width, height) as shown:
+    files = {"index.html": MATERIAL.format(width=width, height=height), "material.js": module}
+
+    def draw(shown: Page) -> Picture:
         wait_until(shown, "document.title === 'drawn'")
         shown.evaluate(TWO_FRAMES)
         return screenshot(shown, "canvas")
+
+    return drawn(files | _three_modules(), width, height, draw)
 
 
 def _wait_for(shown: Page, canvas: str, width: int, height: int) -> None:

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from playwright.sync_api import TimeoutError
 
-from sdf2vec.engines import chromium
+from sdf2vec.engines import EngineError, chromium
 
 
 class TestChromiumPages:
@@ -43,6 +43,29 @@ class TestChromiumPages:
         ):
             assert first.evaluate("document.body.textContent") == "a"
             assert b.evaluate("document.body.textContent") == "b"
+
+
+class TestAPageThatStandsStill:
+    @staticmethod
+    def drawn(times):
+        """A page of which so many times, first, something is waited for that is not there."""
+        seen = []
+
+        def draw(page):
+            seen.append(page)
+            page.locator("#nothing" if len(seen) <= times else "p").wait_for(timeout=200)
+            return chromium.screenshot(page)
+
+        return chromium.drawn({"index.html": "<p>one"}, 50, 40, draw)
+
+    def test_is_drawn_again(self, require_engine):
+        require_engine("chromium")
+        assert self.drawn(1).shape == (40, 50, 4)
+
+    def test_a_second_time_is_said_in_one_line(self, require_engine):
+        require_engine("chromium")
+        with pytest.raises(EngineError, match=r"^Chromium has drawn nothing in 60 seconds$"):
+            self.drawn(2)
 
 
 def test_after_a_page_that_stands_still_there_is_a_new_browser(require_engine):
