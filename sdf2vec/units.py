@@ -370,6 +370,15 @@ SHIFT = Unit(
     Codec(_between("shift")),
     _start_alike,
 )
+STEEPNESS = Unit(  # of a gradient to all sides
+    "steepness",
+    0.0,
+    1000.0,
+    0.06,
+    _always_within(0.0, STEEPEST),
+    Codec(_between("steepness")),
+    _start_alike,
+)
 COLOR = Unit(
     "color",
     -1.0,

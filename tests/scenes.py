@@ -6,7 +6,6 @@ from collections.abc import Sequence
 from sdf2vec import Joint, Layer, Scene, Shape
 from sdf2vec.blend import COMPOSITING, JOINS
 from sdf2vec.layer import Part, Structure
-from sdf2vec.paints import PAINTS
 from sdf2vec.shapes import KINDS
 
 PATCHES = tuple(name for name, kind in KINDS.items() if kind.patch is not None)
@@ -15,6 +14,7 @@ FIRST_COMPACT = (
     "iXNkZgH6HvgGP/////7j08sezKA2ad2XDyAAMW/wAAAGMYx/3p/9Pvxn/en/en/O//en+eP3v+On/6I2r//yP/2f/gDg07aKJFpFLtpP/9/JZXMxd8"
     "4CMkRdOfR5g2LH"
 )
+PAINTED = ("flat", "linear", "flat", "radial")  # one layer after the other
 SOFT = tuple(name for name in KINDS if name not in PATCHES)  # kinds with a soft edge, which can be joined
 
 
@@ -32,6 +32,10 @@ def random_shape(kind: str, r: random.Random, lowest: float = 0.0, paint: str = 
     def gradient():
         end, across, down = color(), r.uniform(-1, 1), r.uniform(-1, 1)
         return (*end, across, down, across * down)
+
+    def rings():
+        *end, across, down, shift = gradient()
+        return (*end, across, down, 1.0 + 0.5 * across, 1.0 - 0.5 * down, shift)
 
     numbers = {
         "circle": lambda: (x, y, size),
@@ -52,7 +56,7 @@ def random_shape(kind: str, r: random.Random, lowest: float = 0.0, paint: str = 
         "gaussian": patch,
         "gabor": lambda: (*patch(), r.uniform(-40, 40), r.uniform(0, 6)),
     }[kind]()
-    own = {"flat": tuple, "linear": gradient}[paint]()
+    own = {"flat": tuple, "linear": gradient, "radial": rings}[paint]()
     return Shape(kind, numbers, first, paint, own)
 
 
@@ -86,7 +90,7 @@ def random_scene(
     width: int = 60,
     height: int = 40,
     transparent: bool = False,
-    paints: Sequence[str] = tuple(PAINTS),
+    paints: Sequence[str] = PAINTED,
     joins: Sequence[str] = tuple(JOINS),
 ) -> Scene:
     """A scene in which every third layer is joined of two or three shapes, where there are joins."""
@@ -110,7 +114,7 @@ FAMILIES: dict[str, list[Structure]] = {
         (Part("box", "linear"), Part("circle", join="subtraction"), Part("ellipse", join="intersection")),
         (Part("displaced"),),
     ],
-    "patches": [(Part("gaussian", "linear"),), (Part("gabor"),)],
+    "patches": [(Part("gaussian", "radial"),), (Part("gabor"),)],
 }
 
 

@@ -12,7 +12,7 @@ from sdf2vec.graph import components_of, scalarize
 from sdf2vec.layer import Formula, P, Part
 from sdf2vec.lower.torch import compile_torch
 from sdf2vec.operation import VEC2
-from sdf2vec.paints import BASE, FLAT, PAINTS, linear_paint
+from sdf2vec.paints import BASE, FLAT, PAINTS, Ramp, Rings, linear_paint, radial_paint
 from sdf2vec.render.reference import render
 from sdf2vec.shapes import KINDS
 
@@ -94,14 +94,55 @@ def test_a_shift_moves_the_middle():
 @pytest.mark.parametrize("shift", [0.0, 0.7, -3.0])
 @pytest.mark.parametrize("direction", [(0.5, 0.0), (0.3, -0.4), (-2.0, 1.0)])
 def test_the_ramp_is_where_the_colours_end(direction, shift):
-    ramp = PAINTS["linear"].ramp
-    assert ramp is not None
-    slope, middle, first, last = ramp(FIRST, LAST, direction, shift)
+    gradient = PAINTS["linear"].gradient
+    assert gradient is not None
+    ramp = gradient(FIRST, LAST, direction, shift)
+    assert isinstance(ramp, Ramp)
+    slope, middle, first, last = ramp
     steepness = slope[0] ** 2 + slope[1] ** 2
     for side, color in ((0.0 - middle, first), (1.0 - middle, last)):
         point = (side * slope[0] / steepness, side * slope[1] / steepness)
         found = linear_paint(vec2(*point), vec3(*FIRST), vec3(*LAST), vec2(*direction), const(shift))
         assert [constant(part) for part in scalarize(found)] == pytest.approx(color)
+
+
+@pytest.mark.parametrize(("kind", "numbers", "start", "end"), ENDS, ids=[row[0] for row in ENDS])
+def test_a_radial_paint_ends_where_the_frame_does(kind, numbers, start, end):
+    """With a steepness of 1: its first colour in the middle of the frame, its last at −1, at 1 and beyond."""
+    shape = Shape(kind, numbers, FIRST, "radial", (*LAST, 0.0, 0.0, 1.0, 1.0, 0.0))
+    shares = np.array([-0.5, 0.0, 0.25, 0.5, 0.75, 1.0, 1.5])
+    x, y = (a + shares * (b - a) for a, b in zip(start, end, strict=True))
+    risen = np.abs(2.0 * shares - 1.0).clip(0, 1)
+    want = np.outer(FIRST, 1 - risen) + np.outer(LAST, risen)
+    np.testing.assert_allclose(color_at(shape, x, y), want, atol=1e-6)
+
+
+def test_a_radial_paint_is_around_its_focus():
+    """t = |(q − focus)·steepness| + shift, on a disc of radius 0.4: along x twice as fast as along y."""
+    shape = Shape("circle", (0, 0, 0.4), FIRST, "radial", (*LAST, 0.5, -0.25, 2.0, 1.0, -0.5))
+    x, y = 0.4 * np.array([[0.5, 0.75, 1.0, 0.5, 0.5, 0.8], [-0.25, -0.25, -0.25, 0.75, 1.25, 0.55]])
+    share = np.array([0.0, 0.0, 0.5, 0.5, 1.0, 0.5])
+    want = np.outer(FIRST, 1 - share) + np.outer(LAST, share)
+    np.testing.assert_allclose(color_at(shape, x, y), want, atol=1e-12)
+
+
+@pytest.mark.parametrize("shift", [0.0, 0.7, -3.0])
+@pytest.mark.parametrize("turn", [0.0, 0.7, 2.0])
+def test_the_rings_are_where_the_colours_end(turn, shift):
+    gradient = PAINTS["radial"].gradient
+    assert gradient is not None
+    rings = gradient(FIRST, LAST, (0.2, -0.1), (0.3, 4.0), shift)
+    assert isinstance(rings, Rings)
+    (x, y), (across, down), lowest, *colors = rings
+    assert colors == [FIRST, LAST]
+    for share in (max(0.0, lowest), 1.0):
+        reach = share - lowest
+        point = (x + reach * math.cos(turn) / across, y + reach * math.sin(turn) / down)
+        found = radial_paint(
+            vec2(*point), vec3(*FIRST), vec3(*LAST), vec2(0.2, -0.1), vec2(0.3, 4.0), const(shift)
+        )
+        wanted = [(1 - share) * first + share * last for first, last in zip(FIRST, LAST, strict=True)]
+        assert [constant(part) for part in scalarize(found)] == pytest.approx(wanted)
 
 
 def test_all_paints_begin_with_a_colour_and_one_is_flat():

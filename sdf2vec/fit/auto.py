@@ -42,7 +42,7 @@ from .pruning import BRIEF, FLOOR, THOROUGH, USUAL, pruned
 from .ramps import KIND, grounded
 from .repainting import ground_shade, repainted
 from .settings import AUTO, Settings, preset_of
-from .shading import Shade, Shading
+from .shading import Gradient, Shading
 from .simplify import sharing, simplified
 from .sparse import Round, grow, needed, taken_apart
 from .surroundings import View, error_of
@@ -183,7 +183,7 @@ def _needed(drawing: Drawing, found: Scene, callback: Callback) -> Fitted:
     return _told(nearest, picture, settings)
 
 
-def _ground_shade(shading: Shading, settings: Settings) -> Shade | None:
+def _ground_shade(shading: Shading, settings: Settings) -> Gradient | None:
     """The gradient of a picture's ground, if it has one, and one more shape may show it."""
     ground = ground_of(scaled(shading.flattened.premultiplied, JOINT))
     shade = ground_shade(ground, shading)

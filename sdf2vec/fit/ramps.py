@@ -7,7 +7,7 @@ from typing import NamedTuple
 import torch
 
 from ..layer import Part, Slot, slots
-from ..paints import FLAT, PAINTS
+from ..paints import FLAT, PAINTS, Ramp
 from ..render import fused
 from ..render.tensors import Group, SceneTensors
 from .joining import Search, inserted
@@ -91,8 +91,9 @@ def _between(layer: Group, points: Points) -> torch.Tensor:
     """Where the colour of a box that is not turned changes [P]: beyond its ends there are two flat colours."""
     values = {slot.parameter.name: value[0] for slot, value in layer.values.items()}
     paint = PAINTS[PAINT]
-    assert paint.ramp is not None
-    ramp = paint.ramp(*(p.values_from(values[p.name].tolist()) for p in paint.parameters))
+    assert paint.gradient is not None
+    ramp = paint.gradient(*(p.values_from(values[p.name].tolist()) for p in paint.parameters))
+    assert isinstance(ramp, Ramp)
     place = (torch.stack(points[:2], dim=1) - values["center"]) / values["half_size"]
     share = ramp.middle + place @ torch.tensor(ramp.slope)
     return (share > 0.0) & (share < 1.0)

@@ -20,7 +20,8 @@ from ..render.tensors import SceneTensors, from_scene
 from ..scene import Layer, Scene, Shape
 from ..shapes import KINDS
 from .ramps import KIND, MARGIN, PAINT
-from .shading import Shade, Shading
+from .rings import Rings
+from .shading import Gradient, Shading
 
 LOOKED = 128  # pixels squared, at which is told which regions are seen of a layer
 NEAR = 0.1  # how far a channel of its colour may be from that of the region
@@ -28,9 +29,11 @@ OPAQUE = 0.9  # at least
 UNSEEN = 3.0 / 255  # change of a colour from a shape's middle to its edge that is not worth a gradient
 LEAST = 0.5  # share of that way on which it changes, at least: there may be no such colours farther on
 TINY = 1e-6
+RINGS = "radial"
+GRID = np.stack(np.meshgrid((-1.0, 0.0, 1.0), (-1.0, 0.0, 1.0)), axis=-1).reshape(-1, 2)  # of a shape's frame
 
 
-def repainted(scene: Scene, shading: Shading, ground: Shade | None) -> Scene:
+def repainted(scene: Scene, shading: Shading, ground: Gradient | None) -> Scene:
     """A scene that is near to a picture without its gradients, with these: in layers of which the region of one is
     seen, and in a box under all that shows the ground's, where it has one.
     """
@@ -43,7 +46,7 @@ def repainted(scene: Scene, shading: Shading, ground: Shade | None) -> Scene:
     return replace(scene, layers=(*below, *layers))
 
 
-def ground_shade(ground: torch.Tensor, shading: Shading) -> Shade | None:
+def ground_shade(ground: torch.Tensor, shading: Shading) -> Gradient | None:
     """The gradient that a ground [4] of the picture without any is in place of, if it is one."""
     near = (number for number in shading.graded if _is_near(shading, number, ground[:3].tolist()))
     return next((shading.shades[number - 1] for number in near), None)
@@ -68,7 +71,7 @@ def _smaller(labels: IntArray) -> IntArray:
     return labels[step // 2 :: step, step // 2 :: step]
 
 
-def _shade_of(layer: Layer, seen: Float64Array, shading: Shading) -> Shade | None:
+def _shade_of(layer: Layer, seen: Float64Array, shading: Shading) -> Gradient | None:
     """The gradient of the region [R] in which most is seen of a layer, if that is one and it has its colour."""
     number = int(seen.argmax()) + 1
     if number not in shading.graded or layer.opacity < OPAQUE:
@@ -81,7 +84,7 @@ def _is_near(shading: Shading, number: int, color: Sequence[float]) -> bool:
     return bool(np.abs(shading.flats[number - 1, :3] - color).max() < NEAR)
 
 
-def _painted(layer: Layer, shade: Shade | None, size: tuple[float, float]) -> Layer:
+def _painted(layer: Layer, shade: Gradient | None, size: tuple[float, float]) -> Layer:
     """A layer whose first shape has a gradient; as it is without one."""
     if shade is None:
         return layer
@@ -94,12 +97,14 @@ def _over_all(size: tuple[float, float]) -> Shape:
     return Shape.of(KIND, center=(0.0, 0.0), half_size=half, angle=0.0, corner_radius=0.0)
 
 
-def _graded(shape: Shape, shade: Shade, size: tuple[float, float]) -> Shape:
+def _graded(shape: Shape, shade: Gradient, size: tuple[float, float]) -> Shape:
     """A shape that shows a gradient on a canvas of this size, as far as there are such colours."""
     middle, right, down = (
         np.array(_frame(shape.kind)(*shape.parameters, *point)) for point in ((0, 0), (1, 0), (0, 1))
     )
     back = np.linalg.inv(np.stack([right - middle, down - middle], axis=1))  # from the frame to the scene
+    if isinstance(shade, Rings):
+        return _ringed(shape, shade, middle, back)
     place = (shade.place - 0.5) * size
     slopes = shade.slopes[:, :3] / np.array(size)[:, None]
     axes, strengths, changes = np.linalg.svd(back.T @ slopes, full_matrices=False)
@@ -113,6 +118,28 @@ def _graded(shape: Shape, shade: Shade, size: tuple[float, float]) -> Shape:
     ends = ((color + way * reach * change).clip(0.0, 1.0) for way in (-1, 1))
     first, last, direction = (tuple(values.tolist()) for values in (*ends, axis / (2 * reach)))
     return Shape.of(shape.kind, first, PAINT, **shape.named(), color_end=last, direction=direction)
+
+
+def _ringed(shape: Shape, rings: Rings, middle: Float64Array, back: Float64Array) -> Shape:
+    """A shape that shows rings. Its frame's origin is `middle` away from the canvas' in the frame; `back` [2, 2] leads
+    from there to the scene.
+
+    Ellipses along other axes than the frame's are as steep along these.
+    """
+    (near, far), stretched = rings.span, np.diag([1.0, rings.squeeze]) @ back
+    focus = middle + np.linalg.solve(back, (rings.place - 0.5) * rings.sides)
+    steepness = np.linalg.norm(stretched, axis=0) / (far - near)
+    first, last = ((rings.color + away * rings.change)[:3].clip(0.0, 1.0) for away in rings.span)
+    shares = np.linalg.norm((GRID - focus) * steepness, axis=1) - near / (far - near)
+    shown = first + shares.clip(0.0, 1.0)[:, None] * (last - first)
+    middle_color = shown[len(GRID) // 2]
+    if np.abs(shown - middle_color).max() <= UNSEEN:
+        return replace(shape, color=tuple(middle_color.tolist()))
+    own = {"color_end": last, "focus": focus, "steepness": steepness}
+    values = {name: tuple(value.tolist()) for name, value in own.items()}
+    return Shape.of(
+        shape.kind, tuple(first.tolist()), RINGS, **shape.named(), **values, shift=-near / (far - near)
+    )
 
 
 @cache

@@ -1,7 +1,8 @@
 """Gradients of a picture, taken out of it: shapes that run from one colour to another are searched in one colour.
 
-Where a region of the picture is a plane in its colours, all of it gets one of these, and what lies beside it or on
-it stays: the picture is flat then. `repainting` puts the gradients into the shapes that were found.
+Where a region of the picture is a plane in its colours, or these change with the distance from a point alone, all of
+it gets one of these, and what lies beside it or on it stays: the picture is flat then. `repainting` puts the gradients
+into the shapes that were found.
 """
 
 from __future__ import annotations
@@ -17,6 +18,7 @@ from scipy import ndimage
 from ..arrays import BoolArray, Float32Array, IntArray
 from ..image import Picture, unpremultiply
 from .region_graph import connected, largest
+from .rings import Rings, rings_of
 from .slopes import BENT, even
 from .views import scaled
 from .windows import Part, Sides, extent, larger, widened
@@ -52,6 +54,12 @@ class Shade(NamedTuple):
         """Whether it is one colour."""
         return not self.slopes.any()
 
+    @property
+    def axis(self) -> Float32Array:
+        """The direction [C] in which its colours lie."""
+        found: Float32Array = np.linalg.svd(self.slopes, full_matrices=False)[2][0]
+        return found
+
     def at(self, x: Float32Array, y: Float32Array) -> Float32Array:
         """The colour there [..., C]."""
         found: Float32Array = (
@@ -60,6 +68,9 @@ class Shade(NamedTuple):
             + (y - self.place[1])[..., None] * self.slopes[1]
         )
         return found
+
+
+Gradient = Shade | Rings
 
 
 @dataclass(frozen=True, eq=False)
@@ -72,7 +83,7 @@ class Shading:
 
     pixels: Float32Array
     labels: IntArray
-    shades: tuple[Shade, ...]
+    shades: tuple[Gradient, ...]
     calm: BoolArray
 
     @classmethod
@@ -117,7 +128,7 @@ class Shading:
         x, y = np.broadcast_arrays(*_places(self.labels.shape))
         shade, inside = self.shades[number - 1], self.labels == number
         away = shade.at(x[inside], y[inside]) - shade.color
-        along = away @ np.linalg.svd(shade.slopes, full_matrices=False)[2][0]
+        along = away @ shade.axis
         ends = (away[along.argsort()[round(share * (len(along) - 1))]] for share in (0.25, 0.75, 0.0, 1.0))
         choices = np.array([shade.color, *(shade.color + end for end in ends)])
         found: Float32Array = np.rint(choices.clip(0.0, 1.0) * WHITE) / WHITE
@@ -200,14 +211,14 @@ def _is_sharp(labels: IntArray, number: int, calm: BoolArray) -> bool:
 # --- regions --------------------------------------------------------------------------------------------------
 
 
-def _regions(pixels: Float32Array, calm: BoolArray) -> tuple[IntArray, list[Shade]]:
-    """The regions of a picture [H, W, C] that are planes, by number from 1, and what these are, the largest first;
-    `calm`: where it is even [H, W].
+def _regions(pixels: Float32Array, calm: BoolArray) -> tuple[IntArray, list[Gradient]]:
+    """The regions of a picture [H, W, C] that are gradients or one colour, by number from 1, and what these are, the
+    largest first; `calm`: where it is even [H, W].
     """
-    labels, shades = np.zeros(pixels.shape[:2], np.int64), list[Shade]()
+    labels, shades = np.zeros(pixels.shape[:2], np.int64), list[Gradient]()
     x, y = np.broadcast_arrays(*_places(pixels.shape[:2]))
-    for inside in _planes(pixels, calm):
-        shade = _shade(x[inside], y[inside], pixels[inside])
+    for inside in _smooth(pixels, calm):
+        shade = _gradient(inside, x[inside], y[inside], pixels)
         if shade is None:
             continue
         same = (
@@ -223,7 +234,7 @@ def _regions(pixels: Float32Array, calm: BoolArray) -> tuple[IntArray, list[Shad
     return labels, shades
 
 
-def _planes(pixels: Float32Array, calm: BoolArray) -> Iterator[BoolArray]:
+def _smooth(pixels: Float32Array, calm: BoolArray) -> Iterator[BoolArray]:
     """Masks [H, W] of connected pixels of a picture where colours hardly bend, and change the same way; the largest
     first.
     """
@@ -234,21 +245,36 @@ def _planes(pixels: Float32Array, calm: BoolArray) -> Iterator[BoolArray]:
     yield from largest(parts, LEAST)
 
 
-def _shade(x: Float32Array, y: Float32Array, colors: Float32Array) -> Shade | None:
-    """The plane through colours [P, C] that changes along one direction, where they are one, and no paler here than
-    there.
+def _gradient(inside: BoolArray, x: Float32Array, y: Float32Array, pixels: Float32Array) -> Gradient | None:
+    """What is inside [H, W] of a picture, at places [P] of that: one colour, a plane, or else rings, where it is near
+    to one, and no paler here than there; rings before a plane that bends.
     """
+    colors = pixels[inside]
+    plane = _plane(x, y, colors)
+    shown = plane.at(x, y)
+    if _is_told(shown, colors, 0.0) and np.ptp(shown, axis=0).max() < CHANGES:
+        return Shade(plane.place, np.median(colors, axis=0), np.zeros_like(plane.slopes))
+    if len(colors) < LEAST_SHADED or (colors.shape[1] == 4 and np.ptp(colors[:, 3]) > CHANGES):
+        return None
+    if _is_told(shown, colors, 0.0):
+        return plane
+    rings = rings_of(inside, pixels)
+    tried: list[Gradient] = [plane] if rings is None else [plane, rings]
+    told = (each for bends in (0.0, BENDS) for each in tried if _is_told(each.at(x, y), colors, bends))
+    return next(told, None)
+
+
+def _is_told(shown: Float32Array, colors: Float32Array, bends: float) -> bool:
+    """Whether colours [P, C] are near to others, or as near as they may be of gradients that bend."""
+    allowed = max(PLANE, bends * float(np.ptp(shown, axis=0).max()))
+    return bool(np.mean(np.abs(shown - colors).max(axis=1) <= allowed) >= NEARLY)
+
+
+def _plane(x: Float32Array, y: Float32Array, colors: Float32Array) -> Shade:
+    """The plane through colours [P, C] that changes along one direction."""
     places = np.stack([x, y], axis=1)
     middle, mean = places.mean(axis=0), colors.mean(axis=0)
-    slopes = _along_one(np.linalg.lstsq(places - middle, colors - mean)[0])
-    change = (places - middle) @ slopes
-    changes = float(np.ptp(change, axis=0).max())
-    if np.mean(np.abs(mean + change - colors).max(axis=1) <= max(PLANE, BENDS * changes)) < NEARLY:
-        return None
-    if changes < CHANGES:
-        return Shade(middle, np.median(colors, axis=0), np.zeros_like(slopes))
-    fades = colors.shape[1] == 4 and np.ptp(colors[:, 3]) > CHANGES
-    return None if fades or len(colors) < LEAST_SHADED else Shade(middle, mean, slopes)
+    return Shade(middle, mean, _along_one(np.linalg.lstsq(places - middle, colors - mean)[0]))
 
 
 def _along_one(slopes: Float32Array) -> Float32Array:

@@ -51,6 +51,12 @@ def ramp(rise=RISE):
     return HALF + (x / SIDE - 0.5)[..., None] * rise
 
 
+def rings(x=40.0, y=30.0, reach=60.0, rise=RISE):
+    """Colours [n, n, 3] of all samples that rise with the distance from a point."""
+    across, down = points()
+    return HALF + (np.hypot(across - x, down - y) / reach - 0.5)[..., None] * rise
+
+
 def view_of(pixels):
     return View(torch.from_numpy(np.ascontiguousarray(pixels.transpose(2, 0, 1))).float(), None)
 

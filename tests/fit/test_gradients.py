@@ -40,6 +40,18 @@ def test_a_badge_is_a_box_with_a_gradient_and_a_disc(ground, shaded):
     assert found.reason.startswith("2 shapes")
 
 
+def test_a_ball_is_a_circle_with_a_radial_gradient(drawn):
+    light = (
+        '<radialGradient id="g" cx=".35" cy=".3" r=".75"><stop stop-color="#ffe0a0"/>'
+        '<stop offset="1" stop-color="#d04000"/></radialGradient>'
+    )
+    picture = drawn(f'{light}{WHITE}<circle cx="64" cy="64" r="50" fill="url(#g)"/>', SIDE, SIDE)
+    found = fitted(picture)
+    (layer,) = found.scene.layers
+    assert [(shape.kind, shape.paint) for shape in layer.shapes] == [("circle", "radial")]
+    assert quality(found.scene, picture).psnr >= 44
+
+
 @pytest.mark.parametrize("shapes", ["auto", 3, 6])
 def test_the_gradient_of_a_ground_counts_as_a_shape(shapes, shaded):
     picture = shaded(GROUND + DISCS)

@@ -11,7 +11,7 @@ import torch
 from sdf2vec.fit.repainting import ground_shade, repainted
 from sdf2vec.render import reference
 from sdf2vec.scene import Joint, Layer, Scene, Shape
-from tests.fit.drawn import HALF, RED, RISE, SIDE, WHITE, box, disc, painted, points, ramp, shading_of
+from tests.fit.drawn import HALF, RED, RISE, SIDE, WHITE, box, disc, painted, points, ramp, rings, shading_of
 
 WHERE: dict[str, Any] = {"center": ((50 - 48) / SIDE, (44 - 48) / SIDE)}  # that disc in scene units
 BOX: dict[str, Any] = {"half_size": (30 / SIDE, 20 / SIDE), "corner_radius": 0.0, "angle": 0.4}
@@ -55,6 +55,37 @@ def test_a_shape_gets_the_gradient_of_its_region(mask, kind, numbers):
     assert layer.shapes[0].paint == "linear"
     assert np.abs(shown(made) - pixels)[36:52, 40:60].max() < 0.01
     assert np.abs(shown(made) - pixels).mean() < 0.003
+
+
+@pytest.mark.parametrize(
+    ("mask", "kind", "numbers"),
+    [
+        (disc(50, 44, 30), "circle", {"radius": 30 / SIDE}),
+        (turned_box(50, 44, (30, 20), 0.4), "box", BOX),
+    ],
+)
+def test_a_shape_gets_the_rings_of_its_region(mask, kind, numbers):
+    """Around a point that is not its middle."""
+    pixels = painted((mask, rings(), 1.0))
+    shading = shading_of(pixels)
+    flat = Scene(
+        SIDE, SIDE, (Layer((Shape.of(kind, middle_color(shading), **WHERE, **numbers),)),), (1, 1, 1)
+    )
+    assert np.abs(shown(flat) - pixels).max() > 0.1
+    made = repainted(flat, shading, None)
+    (layer,) = made.layers
+    assert layer.shapes[0].paint == "radial"
+    assert np.abs(shown(made) - pixels)[36:52, 40:60].max() < 0.01
+    assert np.abs(shown(made) - pixels).mean() < 0.003
+
+
+def test_a_small_shape_gets_the_colour_of_the_ring_there():
+    shading = shading_of(painted((disc(50, 44, 30), rings(), 1.0)))
+    dot = Shape.of("circle", middle_color(shading), center=(20 / SIDE, 0.0), radius=1 / SIDE)
+    (layer,) = repainted(Scene(SIDE, SIDE, (Layer((dot,)),), (1, 1, 1)), shading, None).layers
+    assert layer.shapes[0].paint == "flat"
+    away = np.hypot(68 - 40, 48 - 30) / 60
+    assert layer.shapes[0].color == pytest.approx(HALF + (away - 0.5) * RISE, abs=0.008)
 
 
 @pytest.mark.parametrize(

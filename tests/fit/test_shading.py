@@ -6,8 +6,9 @@ import numpy as np
 import pytest
 
 from sdf2vec.bench.known_scenes import known_scene
-from sdf2vec.fit.shading import Shading
-from tests.fit.drawn import GREEN, HALF, RISE, SIDE, WHITE, box, disc, painted, ramp, shading_of
+from sdf2vec.fit.rings import Rings
+from sdf2vec.fit.shading import Shade, Shading
+from tests.fit.drawn import GREEN, HALF, RISE, SIDE, WHITE, box, disc, painted, ramp, rings, shading_of
 
 
 def flattened(pixels):
@@ -21,6 +22,23 @@ def test_a_shape_with_a_gradient_gets_one_colour_to_its_edge():
     assert color == pytest.approx(HALF + RISE * 2 / SIDE, abs=0.01)
     assert (flat[30:58, 36:64] == color).all()
     assert np.abs(flat - painted((mask, color, 1.0))).max() < 0.02
+
+
+def test_so_does_one_with_a_radial_gradient():
+    mask = disc(50, 44, 30)
+    shading = shading_of(painted((mask, rings(), 1.0)))
+    (number,) = shading.graded
+    shade = shading.shades[number - 1]
+    assert isinstance(shade, Rings)
+    assert shade.place * SIDE == pytest.approx([40.0, 30.0], abs=0.5)
+    color = shading.flattened.pixels[44, 50]
+    assert np.abs(shading.flattened.pixels - painted((mask, color, 1.0))).max() < 0.02
+
+
+def test_a_plane_is_no_radial_gradient():
+    shading = shading_of(painted((box(0, 0, SIDE, SIDE), ramp(), 1.0)))
+    (number,) = shading.graded
+    assert isinstance(shading.shades[number - 1], Shade)
 
 
 def test_what_lies_on_a_gradient_stays():
@@ -79,10 +97,10 @@ def soft_gradient():
     return WHITE + share[..., None] * (HALF + (x / SIDE - 0.5)[..., None] * RISE - WHITE)
 
 
-def round_gradient():
-    x, y = np.meshgrid(*(np.arange(SIDE) + 0.5,) * 2)
-    share = np.clip(np.hypot(x - 48, y - 48) / 40, 0, 1)
-    return np.where(np.hypot(x - 48, y - 48)[..., None] < 36, GREEN + share[..., None] * RISE, WHITE)
+def conic_gradient():
+    x, y = np.meshgrid(*(np.arange(SIDE) - 47.5,) * 2)
+    share = np.abs(np.arctan2(y, x)) / np.pi
+    return np.where(np.hypot(x, y)[..., None] < 36, GREEN + share[..., None] * RISE, WHITE)
 
 
 def both_ways():
@@ -103,7 +121,7 @@ def fading():
         painted((disc(40, 40, 20), GREEN, 1.0)),
         soft(),
         soft_gradient(),
-        round_gradient(),
+        conic_gradient(),
         both_ways(),
         fading(),
         np.random.default_rng(0).random((SIDE, SIDE, 3)),
@@ -114,7 +132,7 @@ def fading():
         "one colour",
         "a soft edge",
         "a gradient with one",
-        "a round one",
+        "a conic one",
         "one for each of two channels",
         "fading",
         "noise",

@@ -125,7 +125,7 @@ def test_numbers_too_large_for_any_machine(literal):
         (("layers", 0, "color"), [1, 1], "must be a list of length 3, got [1, 1]"),
         (("layers", 0, "kind"), "star", f"must be one of {', '.join(KINDS)}, got 'star'"),
         (("layers", 0, "kind"), [], f"must be one of {', '.join(KINDS)}, got []"),
-        (("layers", 1, "paint"), "radial", f"must be one of {', '.join(PAINTS)}, got 'radial'"),
+        (("layers", 1, "paint"), "spiral", f"must be one of {', '.join(PAINTS)}, got 'spiral'"),
         (
             ("layers", 0, "radii"),
             1,

@@ -8,12 +8,12 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ...outlines import EllipseOutline
-from ...scene import Color, Layer, Scene
+from ...scene import Layer, Scene
 from ...shapes import KINDS
 from .bezier_fit import smooth_path, straight_path
 from .blur import Blurred
 from .canvas import Canvas
-from .display import Drawing, Figure, Group, Item, LinearGradient
+from .display import Drawing, Figure, Fill, Group, Item
 from .gradients import SoftEdge, ellipse, radial, sliced
 from .isobands import (
     Band,
@@ -30,7 +30,7 @@ from .plan import Detail, Plan
 from .refit_appearance import refitted
 from .sampling import covers
 from .sharp_edges import NOWHERE, sharp_edge
-from .union_gradient import fill_of, mean_color, ramp_of
+from .union_gradient import fill_of, gradient_of, mean_color
 from .union_partition import part_bands
 
 TRANSPARENT_LIFT = 0.5  # 8-bit levels: on no ground browsers lose half of one at a blur
@@ -82,13 +82,13 @@ class Painter:
             return _blur(layer, blurred, fill, canvas)
         return self._soft(layer, index, fill)
 
-    def _sharp(self, layer: Layer, fill: Color | LinearGradient) -> Item | None:
+    def _sharp(self, layer: Layer, fill: Fill) -> Item | None:
         return Figure(sharp_edge(layer, self.plan.canvas, TOLERANCE), fill, layer.opacity)
 
-    def _soft(self, layer: Layer, index: int, fill: Color | LinearGradient) -> Item | None:
+    def _soft(self, layer: Layer, index: int, fill: Fill) -> Item | None:
         canvas = self.plan.canvas
         outline = edge_of(layer, 0.0)
-        if outline is not None and self.plan.is_crisp and not isinstance(fill, LinearGradient):
+        if outline is not None and self.plan.is_crisp and isinstance(fill, tuple):
             edge = SoftEdge(fill, layer.opacity, layer.falloff * canvas.unit, self.plan.stops[index])
             if (made := core(outline)) is not None:
                 return sliced(canvas.places(made[0]), made[1] * canvas.unit, edge, canvas)
@@ -102,14 +102,14 @@ class Painter:
         spread = float(np.var(layer.colors, axis=0).mean()) * layer.opacity**2
         count = max(bands // 2, band_count(spread, PARTS_COARSER * self.detail.levels))
         found = part_bands(layer, count, self.plan.canvas)
-        fills = [ramp_of(shape, self.plan.canvas) or mean_color(shape) for shape in layer.seen]
+        fills = [gradient_of(shape, self.plan.canvas) or mean_color(shape) for shape in layer.seen]
         return self._stacked(layer, list(zip(fills, found, strict=True)), 2.0 * TOLERANCE)
 
     def _patch(self, layer: Layer, index: int) -> Item | None:
         """Coverage of its own: by one gradient where it is radial, else traced."""
         canvas, (fill, _) = self.plan.canvas, fill_of(layer, self.plan.canvas)
         patch = KINDS[layer.shapes[0].kind].patch
-        if patch is not None and patch.radial and not isinstance(fill, LinearGradient):
+        if patch is not None and patch.radial and isinstance(fill, tuple):
             return radial(layer, fill, canvas)
         grid = trace_grid(layer, canvas)
         if grid is None:
@@ -117,9 +117,7 @@ class Painter:
         bands = cover_bands(covers(layer, grid, 1.0 / canvas.unit), self.plan.bands[index], grid, canvas)
         return self._stacked(layer, [(fill, bands)], TOLERANCE)
 
-    def _stacked(
-        self, layer: Layer, parts: Sequence[tuple[Color | LinearGradient, list[Band]]], least: float
-    ) -> Item | None:
+    def _stacked(self, layer: Layer, parts: Sequence[tuple[Fill, list[Band]]], least: float) -> Item | None:
         """Bands of one or several fills in a group; their contours may be off by `least` user units at least."""
         canvas = self.plan.canvas
         falloff = layer.falloff * canvas.unit
@@ -136,6 +134,6 @@ class Painter:
         return Group(figures, 1.0 if apart else layer.opacity) if figures else None
 
 
-def _blur(layer: Layer, blurred: Blurred, fill: Color | LinearGradient, canvas: Canvas) -> Figure:
+def _blur(layer: Layer, blurred: Blurred, fill: Fill, canvas: Canvas) -> Figure:
     outline = upright(blurred.outline) if blurred.deviation else blurred.outline
     return Figure(placed(outline, canvas), fill, layer.opacity, blurred.deviation * canvas.unit)

@@ -1,29 +1,31 @@
-"""The fill of a layer: a colour, or the colours of a smooth union as a linear gradient."""
+"""The fill of a layer: a colour, the gradient of a paint, or the colours of a smooth union as a linear gradient."""
 
 from __future__ import annotations
 
+import math
 from typing import NamedTuple
 
 import numpy as np
 
 from ...arrays import Float64Array
-from ...paints import PAINTS
+from ...paints import PAINTS, Ramp, Rings
 from ...scene import Color, Layer, Shape
 from .canvas import Canvas, pairs
-from .display import LinearGradient, Stop, moved
+from .display import Fill, LinearGradient, RadialGradient, Stop, moved
 from .isobands import seen
-from .sampling import colors, covers, frame_of, grid_over
+from .sampling import ShapeFrame, colors, covers, frame_of, grid_over
 
 STOPS = 7
 CELLS = 48  # of the grid along the longest side
 SAME = 0.5 / 255.0
 FLAT = 1e-9
+FARTHEST = 1e4  # user units: a radius of a gradient, at most
 
 
 class LayerFill(NamedTuple):
     """A fill, and by how many 8-bit levels the layer's own colours differ from it."""
 
-    fill: Color | LinearGradient
+    fill: Fill
     error: float = 0.0
 
 
@@ -36,8 +38,8 @@ def fill_of(layer: Layer, canvas: Canvas, lift: float = 0.0) -> LayerFill:
     flat = LayerFill(moved(own.mean(axis=0).tolist(), lift))
     if np.ptp(own, axis=0).max() <= SAME:
         return flat
-    if len(layer.seen) == 1 and (ramp := ramp_of(layer.seen[0], canvas, lift)) is not None:
-        return LayerFill(ramp)
+    if len(layer.seen) == 1 and (own_fill := gradient_of(layer.seen[0], canvas, lift)) is not None:
+        return LayerFill(own_fill)
     box = seen(layer, canvas)
     if box.empty:
         return flat
@@ -52,23 +54,50 @@ def fill_of(layer: Layer, canvas: Canvas, lift: float = 0.0) -> LayerFill:
     return LayerFill(LinearGradient(start, end, stops), 255.0 * off * max(layer.opacity, 1e-3))
 
 
-def ramp_of(shape: Shape, canvas: Canvas, lift: float = 0.0) -> LinearGradient | Color | None:
-    """A paint that is a linear gradient as one, or as a colour where it is next to none; None for any other."""
-    ramp_from, frame = PAINTS[shape.paint].ramp, frame_of(shape)
-    if ramp_from is None:
+def gradient_of(shape: Shape, canvas: Canvas, lift: float = 0.0) -> Fill | None:
+    """A paint that is a gradient as one, or as a colour where it is next to none; None for any other."""
+    gradient_from, frame = PAINTS[shape.paint].gradient, frame_of(shape)
+    if gradient_from is None:
         return None
-    ramp = ramp_from(*shape.painted().values())
+    gradient = gradient_from(*shape.painted().values())
+    if isinstance(gradient, Ramp):
+        return _linear(gradient, frame, canvas, lift)
+    return _radial(gradient, frame, canvas, lift)
+
+
+def _linear(ramp: Ramp, frame: ShapeFrame, canvas: Canvas, lift: float) -> Fill:
     (cosine, sine), (across, down) = frame.axis, np.array(ramp.slope) / np.maximum(frame.half, FLAT)
     slope = np.array(
         [across * cosine - down * sine, across * sine + down * cosine]
     )  # along x and y of the scene
     steepness = float(slope @ slope)
     if steepness < FLAT:
-        ends = zip(ramp.first, ramp.last, strict=True)
-        return moved([float(np.interp(ramp.middle, (0.0, 1.0), pair)) for pair in ends], lift)
+        return _mixed(ramp, ramp.middle, lift)
     places = frame.origin + np.outer((-ramp.middle, 1.0 - ramp.middle), slope / steepness)
     start, end = pairs(canvas.places(places))
     return LinearGradient(start, end, (Stop(0.0, moved(ramp.first, lift)), Stop(1.0, moved(ramp.last, lift))))
+
+
+def _radial(rings: Rings, frame: ShapeFrame, canvas: Canvas, lift: float) -> Fill:
+    """With a rim where the last colour begins, as far as a colour begins there."""
+    rise = 1.0 - rings.lowest
+    slopes = np.array(rings.slope) / np.maximum(frame.half, FLAT)
+    if rise <= 0.0 or slopes.max() * FARTHEST < rise * canvas.unit:
+        return _mixed(rings, rings.lowest, lift)
+    radii = np.minimum(rise * canvas.unit / np.maximum(slopes, FLAT), FARTHEST)
+    across, down = np.array(rings.focus) * frame.half
+    (cosine, sine) = frame.axis
+    place = frame.origin + np.array([across * cosine - down * sine, across * sine + down * cosine])
+    (center,) = pairs(canvas.places(place[None]))
+    start = max(-rings.lowest, 0.0) / rise
+    stops = (Stop(start, _mixed(rings, rings.lowest, lift)), Stop(1.0, moved(rings.last, lift)))
+    return RadialGradient(center, (float(radii[0]), float(radii[1])), stops, math.atan2(sine, cosine))
+
+
+def _mixed(gradient: Ramp | Rings, share: float, lift: float) -> Color:
+    """The colour of a gradient at a share of the way, from 0 to 1."""
+    ends = zip(gradient.first, gradient.last, strict=True)
+    return moved([float(np.interp(share, (0.0, 1.0), pair)) for pair in ends], lift)
 
 
 def mean_color(shape: Shape) -> Color:

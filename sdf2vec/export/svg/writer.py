@@ -10,7 +10,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import singledispatchmethod
 from itertools import groupby
-from typing import Any
+from typing import Any, TypeGuard
 from xml.etree import ElementTree
 from xml.sax.saxutils import escape
 
@@ -203,8 +203,7 @@ class _Writer:
 
     def _within_element(self, point: Point, geometry: Geometry) -> Point:
         """A point in the coordinates of the element that a geometry becomes: a turned one has its own."""
-        round_ = isinstance(geometry, EllipseOutline) and len({*map(self.number, geometry.radii)}) == 1
-        if not isinstance(geometry, EllipseOutline | RectangleOutline) or round_:
+        if not self._is_turned(geometry):
             return point
         angle = geometry.angle % math.pi
         x, y = (a - b for a, b in zip(point, geometry.center, strict=True))
@@ -212,20 +211,31 @@ class _Writer:
         left, top = (0.0, 0.0) if isinstance(geometry, EllipseOutline) else geometry.center
         return x + left, y + top
 
+    def _is_turned(self, geometry: Geometry) -> TypeGuard[EllipseOutline | RectangleOutline]:
+        """Whether the element that a geometry becomes has coordinates of its own."""
+        round_ = isinstance(geometry, EllipseOutline) and len({*map(self.number, geometry.radii)}) == 1
+        return isinstance(geometry, EllipseOutline | RectangleOutline) and not round_
+
     @paint.register
     def _(self, fill: RadialGradient, figure: Figure) -> str:
-        """Within an ellipse of its own in the ellipse's units.
+        """In user units, turned and squeezed where it is not round.
 
         Not in shares of its box, where that is no square: librsvg mistakes gradients that are stretched with a box.
         """
-        (x, y), (across, down) = fill.center, fill.radii
-        own = isinstance(figure.geometry, EllipseOutline)
-        if own and self.number(across) == self.number(down):
+        geometry, (across, down) = figure.geometry, fill.radii
+        radius, is_round = self.number(across), self.number(across) == self.number(down)
+        if is_round and isinstance(geometry, EllipseOutline) and _has_rim_of(geometry, fill):
             return self._gradient(self.svg.radialGradient(), fill.stops)
-        center = ("0", "0") if own else (self.number(x), self.number(y))
-        squeeze = f"scale(1 {number(down / across, 5)})" if own else None
-        made = self.svg.radialGradient(center, self.number(across), gradientUnits="userSpaceOnUse")
-        made["gradientTransform"] = squeeze
+        x, y = map(self.number, self._within_element(fill.center, geometry))
+        if is_round:
+            made = self.svg.radialGradient((x, y), radius, gradientUnits="userSpaceOnUse")
+            return self._gradient(made, fill.stops)
+        own = geometry.angle if self._is_turned(geometry) else 0.0
+        turn = number(math.degrees(fill.angle - own) % 180.0, 2)
+        steps = {f"translate({x} {y})": (x, y) != ("0", "0"), f"rotate({turn})": turn not in ("0", "180")}
+        steps[f"scale(1 {number(down / across, 5)})"] = True
+        made = self.svg.radialGradient(("0", "0"), radius, gradientUnits="userSpaceOnUse")
+        made["gradientTransform"] = "".join(step for step, needed in steps.items() if needed)
         return self._gradient(made, fill.stops)
 
     def _gradient(self, gradient: Element, stops: Sequence[Stop]) -> str:
@@ -389,6 +399,11 @@ class _Writer:
     def fine(self, value: float) -> str:
         """A number that directions hang on: with two decimals more."""
         return number(value, self.drawing.digits + 2)
+
+
+def _has_rim_of(outline: EllipseOutline, gradient: RadialGradient) -> bool:
+    """Whether a gradient ends where an ellipse does."""
+    return (gradient.center, gradient.radii) == (outline.center, outline.radii)
 
 
 def _is_bent(geometry: Geometry) -> bool:

@@ -1,12 +1,15 @@
 """Fills: a colour, a paint's gradient, the gradient nearest to a union's colours."""
 
+import math
+from typing import Any
+
 import numpy as np
 import pytest
 
 from sdf2vec import Layer, Scene, Shape
 from sdf2vec.export.svg.canvas import Canvas
-from sdf2vec.export.svg.display import LinearGradient
-from sdf2vec.export.svg.union_gradient import fill_of, mean_color, nearest_gradient, ramp_of
+from sdf2vec.export.svg.display import LinearGradient, RadialGradient, Stop
+from sdf2vec.export.svg.union_gradient import fill_of, gradient_of, mean_color, nearest_gradient
 from tests.export.svg.drawings import Parameters
 
 CANVAS = Canvas.of(Scene(300, 200, (), None))
@@ -18,13 +21,13 @@ def test_one_colour_is_that_colour():
     shape = Shape.of("circle", RED, **PLACE)
     assert fill_of(Layer((shape,), 0.1), CANVAS) == (RED, 0.0)
     assert fill_of(Layer((shape,), 0.1), CANVAS, 255.0 / 2).fill == (1.5, 0.5, 0.5)
-    assert ramp_of(shape, CANVAS) is None
+    assert gradient_of(shape, CANVAS) is None
 
 
 def test_a_linear_paint_is_its_gradient():
     """A direction of one half goes from −1 to 1 of the frame: from edge to edge of the disc."""
     shape = Shape.of("circle", RED, paint="linear", color_end=BLUE, direction=(0.5, 0), **PLACE)
-    ramp = ramp_of(shape, CANVAS)
+    ramp = gradient_of(shape, CANVAS)
     assert isinstance(ramp, LinearGradient)
     assert ramp.start == pytest.approx((100.0, 100.0))
     assert ramp.end == pytest.approx((200.0, 100.0))
@@ -36,11 +39,52 @@ def test_a_linear_paint_is_its_gradient():
 def test_a_shifted_paint_is_a_shifted_gradient():
     """With a shift of one quarter half of each is halfway from the middle to where it begins."""
     values = {"paint": "linear", "color_end": BLUE, "shift": 0.25, **PLACE}
-    ramp = ramp_of(Shape.of("circle", RED, direction=(0.5, 0), **values), CANVAS)
+    ramp = gradient_of(Shape.of("circle", RED, direction=(0.5, 0), **values), CANVAS)
     assert isinstance(ramp, LinearGradient)
     assert ramp.start == pytest.approx((75.0, 100.0))
     assert ramp.end == pytest.approx((175.0, 100.0))
-    assert ramp_of(Shape.of("circle", RED, direction=(0, 0), **values), CANVAS) == (0.25, 0.0, 0.75)
+    assert gradient_of(Shape.of("circle", RED, direction=(0, 0), **values), CANVAS) == (0.25, 0.0, 0.75)
+
+
+def test_a_radial_paint_is_its_gradient():
+    """On a turned ellipse: from a point halfway along its long axis, to ellipses twice as large as it."""
+    angle = math.pi / 2
+    values: dict[str, Any] = {"paint": "radial", "color_end": BLUE, "steepness": (0.5, 0.5)}
+    place: Parameters = {"center": (0.1, 0), "radii": (0.4, 0.2), "angle": angle}
+    rings = gradient_of(Shape.of("ellipse", RED, focus=(0.5, 0), **values, **place), CANVAS)
+    assert isinstance(rings, RadialGradient)
+    assert rings.center == pytest.approx((170.0, 140.0))
+    assert rings.radii == pytest.approx((160.0, 80.0))
+    assert rings.angle == pytest.approx(angle)
+    assert rings.stops == (Stop(0.0, RED), Stop(1.0, BLUE))
+
+
+@pytest.mark.parametrize(
+    ("shift", "radius", "stops"),
+    [
+        (-1.0, 100.0, (Stop(0.5, RED), Stop(1.0, BLUE))),  # the first colour alone, halfway
+        (0.5, 25.0, (Stop(0.0, (0.5, 0.0, 0.5)), Stop(1.0, BLUE))),
+    ],
+)
+def test_a_shifted_radial_paint_begins_elsewhere(shift, radius, stops):
+    values: dict[str, Any] = {
+        "paint": "radial",
+        "color_end": BLUE,
+        "steepness": (1, 1),
+        "focus": (0, 0),
+        "shift": shift,
+    }
+    rings = gradient_of(Shape.of("circle", RED, **values, **PLACE), CANVAS)
+    assert isinstance(rings, RadialGradient)
+    assert rings.radii == pytest.approx((radius, radius))
+    assert rings.stops == stops
+
+
+@pytest.mark.parametrize(("steepness", "shift", "color"), [(1.0, 1.5, BLUE), (0.0, 0.25, (0.75, 0.0, 0.25))])
+def test_a_radial_paint_of_one_colour_is_that_colour(steepness, shift, color):
+    values: dict[str, Any] = {"paint": "radial", "color_end": BLUE, "focus": (0, 0), "shift": shift}
+    shape = Shape.of("circle", RED, steepness=(steepness, steepness), **values, **PLACE)
+    assert gradient_of(shape, CANVAS) == color
 
 
 def test_two_colours_of_a_union_lie_along_a_line():
