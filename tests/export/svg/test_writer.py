@@ -23,6 +23,7 @@ NAMESPACE = "{http://www.w3.org/2000/svg}"
 RED, BLUE = (1.0, 0.0, 0.0), (0.0, 0.0, 1.0)
 FADE = (Stop(0.0, RED), Stop(1.0, RED, 0.0))
 DISC = EllipseOutline((20.0, 30.0), (10.0, 10.0))
+SQUARE = PolygonOutline(((0.0, 0.0), (9.0, 0.0), (9.0, 9.0), (0.0, 9.0)), 0.0)
 
 
 def text_of(*items, style=None, digits=1):
@@ -68,6 +69,30 @@ def test_a_disc_and_its_own_gradient_are_in_shares_of_its_box():
     (gradient,) = root.findall(f"{NAMESPACE}defs/*")
     assert set(gradient.attrib) == {"id"}
     assert [(s.get("offset"), s.get("stop-opacity")) for s in gradient] == [("0", None), ("1", "0")]
+
+
+@pytest.mark.parametrize(
+    ("geometry", "transform"),
+    [
+        (SQUARE, "translate(5 3)rotate(30)scale(1 .5)"),
+        (EllipseOutline((5.0, 3.0), (6.0, 2.0), 0.0), "rotate(30)scale(1 .5)"),
+        (EllipseOutline((5.0, 3.0), (6.0, 2.0), math.pi / 6), "scale(1 .5)"),
+        (EllipseOutline((4.0, 3.0), (6.0, 2.0), math.pi / 2), "translate(0 -1)rotate(120)scale(1 .5)"),
+    ],
+    ids=["a polygon", "an ellipse around it", "turned as it is", "turned elsewhere"],
+)
+def test_a_squeezed_radial_gradient_is_in_the_element_s_own_units(geometry, transform):
+    """Its middle is (5, 3) and its long axis 30° down from x."""
+    root = parsed(Figure(geometry, RadialGradient((5.0, 3.0), (8.0, 4.0), FADE, math.pi / 6)))
+    (gradient,) = root.findall(f"{NAMESPACE}defs/*")
+    assert gradient.get("gradientTransform") == transform
+    assert [gradient.get(name) for name in ("cx", "cy", "r")] == ["0", "0", "8"]
+
+
+def test_a_round_one_has_its_middle():
+    root = parsed(Figure(DISC, RadialGradient((5.0, 3.0), (8.0, 8.0), FADE)))
+    (gradient,) = root.findall(f"{NAMESPACE}defs/*")
+    assert [gradient.get(name) for name in ("cx", "cy", "r")] == ["5", "3", "8"]
 
 
 def test_rounded_steps_do_not_add_up():
