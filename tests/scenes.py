@@ -14,7 +14,7 @@ FIRST_COMPACT = (
     "iXNkZgH6HvgGP/////7j08sezKA2ad2XDyAAMW/wAAAGMYx/3p/9Pvxn/en/en/O//en+eP3v+On/6I2r//yP/2f/gDg07aKJFpFLtpP/9/JZXMxd8"
     "4CMkRdOfR5g2LH"
 )
-PAINTED = ("flat", "linear")  # one layer after the other; a radial one is in `FAMILIES`
+PAINTED = ("flat", "linear", "flat", "radial")  # one layer after the other
 SOFT = tuple(name for name in KINDS if name not in PATCHES)  # kinds with a soft edge, which can be joined
 
 

@@ -20,7 +20,7 @@ from ..render.tensors import SceneTensors, from_scene
 from ..scene import Layer, Scene, Shape
 from ..shapes import KINDS
 from .ramps import KIND, MARGIN, PAINT
-from .rings import Rings
+from .rings import RadialShade
 from .shading import Gradient, Shading
 
 LOOKED = 128  # pixels squared, at which is told which regions are seen of a layer
@@ -29,7 +29,7 @@ OPAQUE = 0.9  # at least
 UNSEEN = 3.0 / 255  # change of a colour from a shape's middle to its edge that is not worth a gradient
 LEAST = 0.5  # share of that way on which it changes, at least: there may be no such colours farther on
 TINY = 1e-6
-RINGS = "radial"
+RADIAL = "radial"
 GRID = np.stack(np.meshgrid((-1.0, 0.0, 1.0), (-1.0, 0.0, 1.0)), axis=-1).reshape(-1, 2)  # of a shape's frame
 
 
@@ -103,7 +103,7 @@ def _graded(shape: Shape, shade: Gradient, size: tuple[float, float]) -> Shape:
         np.array(_frame(shape.kind)(*shape.parameters, *point)) for point in ((0, 0), (1, 0), (0, 1))
     )
     back = np.linalg.inv(np.stack([right - middle, down - middle], axis=1))  # from the frame to the scene
-    if isinstance(shade, Rings):
+    if isinstance(shade, RadialShade):
         return _ringed(shape, shade, middle, back)
     place = (shade.place - 0.5) * size
     slopes = shade.slopes[:, :3] / np.array(size)[:, None]
@@ -120,7 +120,7 @@ def _graded(shape: Shape, shade: Gradient, size: tuple[float, float]) -> Shape:
     return Shape.of(shape.kind, first, PAINT, **shape.named(), color_end=last, direction=direction)
 
 
-def _ringed(shape: Shape, rings: Rings, middle: Float64Array, back: Float64Array) -> Shape:
+def _ringed(shape: Shape, rings: RadialShade, middle: Float64Array, back: Float64Array) -> Shape:
     """A shape that shows rings. Its frame's origin is `middle` away from the canvas' in the frame; `back` [2, 2] leads
     from there to the scene.
 
@@ -138,7 +138,7 @@ def _ringed(shape: Shape, rings: Rings, middle: Float64Array, back: Float64Array
     own = {"color_end": last, "focus": focus, "steepness": steepness}
     values = {name: tuple(value.tolist()) for name, value in own.items()}
     return Shape.of(
-        shape.kind, tuple(first.tolist()), RINGS, **shape.named(), **values, shift=-near / (far - near)
+        shape.kind, tuple(first.tolist()), RADIAL, **shape.named(), **values, shift=-near / (far - near)
     )
 
 

@@ -20,7 +20,7 @@ TIP = 0.015  # the same, of what is too near to the middle of rings to be smooth
 SCALES, MOST_STEPS, TINY = (0.1, 0.1, 0.3, 0.1, 0.1), 60, 1e-3  # of the search: of its numbers; in it
 
 
-class Rings(NamedTuple):
+class RadialShade(NamedTuple):
     """Premultiplied colours [C] at a place (x, y), by shares of the sides, and how much they change for each unit of
     the distance from there: in shares of the shorter side, of which that along y counts `squeeze` times. They change
     between two distances, `span`, alone. `sides`: width and height, in the same unit.
@@ -53,7 +53,7 @@ class Rings(NamedTuple):
         return found
 
 
-def rings_of(inside: BoolArray, pixels: Float32Array) -> Rings | None:
+def rings_of(inside: BoolArray, pixels: Float32Array) -> RadialShade | None:
     """The radial gradient that is nearest to what is inside [H, W] of a picture [H, W, C]; None for too few pixels."""
     if inside.sum() < LEAST:
         return None
@@ -71,7 +71,7 @@ def rings_of(inside: BoolArray, pixels: Float32Array) -> Rings | None:
     away = np.hypot(x - middle[0], (y - middle[1]) * squeeze).clip(*span)
     terms = np.stack([np.ones_like(away), away], axis=1)
     color, change = np.linalg.lstsq(terms, pixels[inside].astype(np.float64))[0].astype(np.float32)
-    return Rings(np.array(middle / sides, np.float32), color, change, squeeze, span, sides)
+    return RadialShade(np.array(middle / sides, np.float32), color, change, squeeze, span, sides)
 
 
 def _along_one(colors: Float32Array) -> Float64Array:

@@ -18,7 +18,7 @@ from scipy import ndimage
 from ..arrays import BoolArray, Float32Array, IntArray
 from ..image import Picture, unpremultiply
 from .region_graph import connected, largest
-from .rings import Rings, rings_of
+from .rings import RadialShade, rings_of
 from .slopes import BENT, even
 from .views import scaled
 from .windows import Part, Sides, extent, larger, widened
@@ -70,7 +70,7 @@ class Shade(NamedTuple):
         return found
 
 
-Gradient = Shade | Rings
+Gradient = Shade | RadialShade
 
 
 @dataclass(frozen=True, eq=False)
@@ -259,9 +259,12 @@ def _gradient(inside: BoolArray, x: Float32Array, y: Float32Array, pixels: Float
     if _is_told(shown, colors, 0.0):
         return plane
     rings = rings_of(inside, pixels)
-    tried: list[Gradient] = [plane] if rings is None else [plane, rings]
-    told = (each for bends in (0.0, BENDS) for each in tried if _is_told(each.at(x, y), colors, bends))
-    return next(told, None)
+    around = None if rings is None else rings.at(x, y)
+    if around is not None and _is_told(around, colors, 0.0):
+        return rings
+    if _is_told(shown, colors, BENDS):
+        return plane
+    return rings if around is not None and _is_told(around, colors, BENDS) else None
 
 
 def _is_told(shown: Float32Array, colors: Float32Array, bends: float) -> bool:

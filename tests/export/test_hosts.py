@@ -24,7 +24,7 @@ from sdf2vec.roundtrip import (
 )
 from tests.scenes import random_scene
 
-SCENE = random_scene(("triangle", "box"), layers=9, seed=12, width=90, height=60)
+SCENE = random_scene(("triangle", "box"), layers=9, seed=12, width=90, height=60, paints=("flat", "linear"))
 SIZES = [(180, 120), (203, 90), (24, 16)]
 
 

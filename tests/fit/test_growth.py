@@ -104,7 +104,7 @@ def circles(count: int, seed: int = 0) -> list[Group]:
 
 
 def two_kinds():
-    scene = random_scene(("circle", "box"), layers=8, joins=())
+    scene = random_scene(("circle", "box"), layers=8, joins=(), paints=("flat", "linear"))
     tensors = from_scene(scene)
     return tensors, adam_over(tensors)
 

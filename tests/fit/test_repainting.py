@@ -33,30 +33,15 @@ def turned_box(x, y, half, angle):
     return (np.abs(along) < half[0]) & (np.abs(beside) < half[1])
 
 
-@pytest.mark.parametrize(
-    ("mask", "kind", "numbers"),
-    [
-        (disc(50, 44, 30), "circle", {"radius": 30 / SIDE}),
-        (turned_box(50, 44, (30, 20), 0.4), "box", BOX),
-    ],
-)
-def test_a_shape_gets_the_gradient_of_its_region(mask, kind, numbers):
-    """Down and across, of another strength in each channel; a turned box has a frame of its own."""
+def down_and_across():
+    """Colours [n, n, 3] of all samples, of another strength in each channel."""
     x, y = points()
-    colors = HALF + ((0.8 * x + 0.6 * y) / SIDE - 0.5)[..., None] * RISE
-    pixels = painted((mask, colors, 1.0))
-    shading = shading_of(pixels)
-    flat = Scene(
-        SIDE, SIDE, (Layer((Shape.of(kind, middle_color(shading), **WHERE, **numbers),)),), (1, 1, 1)
-    )
-    assert np.abs(shown(flat) - pixels).max() > 0.1
-    made = repainted(flat, shading, None)
-    (layer,) = made.layers
-    assert layer.shapes[0].paint == "linear"
-    assert np.abs(shown(made) - pixels)[36:52, 40:60].max() < 0.01
-    assert np.abs(shown(made) - pixels).mean() < 0.003
+    return HALF + ((0.8 * x + 0.6 * y) / SIDE - 0.5)[..., None] * RISE
 
 
+@pytest.mark.parametrize(
+    ("colors", "paint"), [(down_and_across, "linear"), (rings, "radial")], ids=["linear", "radial"]
+)
 @pytest.mark.parametrize(
     ("mask", "kind", "numbers"),
     [
@@ -64,9 +49,9 @@ def test_a_shape_gets_the_gradient_of_its_region(mask, kind, numbers):
         (turned_box(50, 44, (30, 20), 0.4), "box", BOX),
     ],
 )
-def test_a_shape_gets_the_rings_of_its_region(mask, kind, numbers):
-    """Around a point that is not its middle."""
-    pixels = painted((mask, rings(), 1.0))
+def test_a_shape_gets_the_gradient_of_its_region(mask, kind, numbers, colors, paint):
+    """Also around a point that is not its middle; a turned box has a frame of its own."""
+    pixels = painted((mask, colors(), 1.0))
     shading = shading_of(pixels)
     flat = Scene(
         SIDE, SIDE, (Layer((Shape.of(kind, middle_color(shading), **WHERE, **numbers),)),), (1, 1, 1)
@@ -74,7 +59,7 @@ def test_a_shape_gets_the_rings_of_its_region(mask, kind, numbers):
     assert np.abs(shown(flat) - pixels).max() > 0.1
     made = repainted(flat, shading, None)
     (layer,) = made.layers
-    assert layer.shapes[0].paint == "radial"
+    assert layer.shapes[0].paint == paint
     assert np.abs(shown(made) - pixels)[36:52, 40:60].max() < 0.01
     assert np.abs(shown(made) - pixels).mean() < 0.003
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from sdf2vec.bench.known_scenes import known_scene
-from sdf2vec.fit.rings import Rings
+from sdf2vec.fit.rings import RadialShade
 from sdf2vec.fit.shading import Shade, Shading
 from tests.fit.drawn import GREEN, HALF, RISE, SIDE, WHITE, box, disc, painted, ramp, rings, shading_of
 
@@ -29,7 +29,7 @@ def test_so_does_one_with_a_radial_gradient():
     shading = shading_of(painted((mask, rings(), 1.0)))
     (number,) = shading.graded
     shade = shading.shades[number - 1]
-    assert isinstance(shade, Rings)
+    assert isinstance(shade, RadialShade)
     assert shade.place * SIDE == pytest.approx([40.0, 30.0], abs=0.5)
     color = shading.flattened.pixels[44, 50]
     assert np.abs(shading.flattened.pixels - painted((mask, color, 1.0))).max() < 0.02

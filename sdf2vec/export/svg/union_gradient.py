@@ -66,10 +66,7 @@ def gradient_of(shape: Shape, canvas: Canvas, lift: float = 0.0) -> Fill | None:
 
 
 def _linear(ramp: Ramp, frame: ShapeFrame, canvas: Canvas, lift: float) -> Fill:
-    (cosine, sine), (across, down) = frame.axis, np.array(ramp.slope) / np.maximum(frame.half, FLAT)
-    slope = np.array(
-        [across * cosine - down * sine, across * sine + down * cosine]
-    )  # along x and y of the scene
+    slope = _turned(np.array(ramp.slope) / np.maximum(frame.half, FLAT), frame)
     steepness = float(slope @ slope)
     if steepness < FLAT:
         return _mixed(ramp, ramp.middle, lift)
@@ -85,13 +82,18 @@ def _radial(rings: Rings, frame: ShapeFrame, canvas: Canvas, lift: float) -> Fil
     if rise <= 0.0 or slopes.max() * FARTHEST < rise * canvas.unit:
         return _mixed(rings, rings.lowest, lift)
     radii = np.minimum(rise * canvas.unit / np.maximum(slopes, FLAT), FARTHEST)
-    across, down = np.array(rings.focus) * frame.half
-    (cosine, sine) = frame.axis
-    place = frame.origin + np.array([across * cosine - down * sine, across * sine + down * cosine])
-    (center,) = pairs(canvas.places(place[None]))
+    (center,) = pairs(canvas.places(frame.origin + _turned(np.array(rings.focus) * frame.half, frame)))
     start = max(-rings.lowest, 0.0) / rise
     stops = (Stop(start, _mixed(rings, rings.lowest, lift)), Stop(1.0, moved(rings.last, lift)))
-    return RadialGradient(center, (float(radii[0]), float(radii[1])), stops, math.atan2(sine, cosine))
+    return RadialGradient(
+        center, (float(radii[0]), float(radii[1])), stops, math.atan2(frame.axis[1], frame.axis[0])
+    )
+
+
+def _turned(vector: Float64Array, frame: ShapeFrame) -> Float64Array:
+    """A vector along the axes of a frame, along x and y of the scene."""
+    (across, down), (cosine, sine) = vector, frame.axis
+    return np.array([across * cosine - down * sine, across * sine + down * cosine])
 
 
 def _mixed(gradient: Ramp | Rings, share: float, lift: float) -> Color:
