@@ -16,6 +16,7 @@ SMOOTH = 2.0  # pixels, of the standard deviation of a blur that takes away the 
 STEEP = 0.3  # share of the largest slopes, of those that point to the middle
 ROUND = 8.0  # times the one axis of an ellipse, that the other may be
 FARTHEST = 3.0  # shorter sides of the picture, from a region's middle to that of its rings
+MOSTLY = 0.5  # of the pixels lie where colours change, at least: else it is one colour that ends softly
 TIP = 0.015  # the same, of what is too near to the middle of rings to be smooth
 SCALES, MOST_STEPS, TINY = (0.1, 0.1, 0.3, 0.1, 0.1), 60, 1e-3  # of the search: of its numbers; in it
 
@@ -54,7 +55,9 @@ class RadialShade(NamedTuple):
 
 
 def rings_of(inside: BoolArray, pixels: Float32Array) -> RadialShade | None:
-    """The radial gradient that is nearest to what is inside [H, W] of a picture [H, W, C]; None for too few pixels."""
+    """The radial gradient that is nearest to what is inside [H, W] of a picture [H, W, C]; None for too few pixels,
+    or where most are of one colour.
+    """
     if inside.sum() < LEAST:
         return None
     height, width = inside.shape
@@ -68,7 +71,10 @@ def rings_of(inside: BoolArray, pixels: Float32Array) -> RadialShade | None:
     if found is None:
         return None
     middle, squeeze, span = found
-    away = np.hypot(x - middle[0], (y - middle[1]) * squeeze).clip(*span)
+    away = np.hypot(x - middle[0], (y - middle[1]) * squeeze)
+    if np.mean((away > span[0]) & (away < span[1])) < MOSTLY:
+        return None
+    away = away.clip(*span)
     terms = np.stack([np.ones_like(away), away], axis=1)
     color, change = np.linalg.lstsq(terms, pixels[inside].astype(np.float64))[0].astype(np.float32)
     return RadialShade(np.array(middle / sides, np.float32), color, change, squeeze, span, sides)
