@@ -13,7 +13,7 @@ from typing import NamedTuple
 from .expr import Expr, clamp, dot, length, mix
 from .function import function
 from .operation import FLOAT, VEC2, VEC3
-from .units import COLOR, DIRECTION, SHIFT, STEEPNESS, Parameter
+from .units import COLOR, DIRECTION, RISE, SHIFT, Parameter
 
 
 class Ramp(NamedTuple):
@@ -99,7 +99,7 @@ PAINTS: dict[str, Paint] = {
             (
                 Parameter("color_end", COLOR, (0.0, 0.0, 0.0)),
                 Parameter("focus", SHIFT, (0.0, 0.0)),
-                Parameter("steepness", STEEPNESS, (1.0, 1.0)),
+                Parameter("steepness", RISE, (1.0, 1.0)),
                 Parameter("shift", SHIFT, optional=True, since=2),
             ),
             gradient=lambda color, color_end, focus, steepness, shift: Rings(

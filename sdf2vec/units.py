@@ -370,13 +370,13 @@ SHIFT = Unit(
     Codec(_between("shift")),
     _start_alike,
 )
-STEEPNESS = Unit(  # of a gradient to all sides
-    "steepness",
+RISE = Unit(  # of a gradient to all sides
+    "rise",
     0.0,
     1000.0,
     0.06,
     _always_within(0.0, STEEPEST),
-    Codec(_between("steepness")),
+    Codec(_between("rise")),
     _start_alike,
 )
 COLOR = Unit(
