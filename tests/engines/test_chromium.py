@@ -53,7 +53,8 @@ class TestAPageThatStandsStill:
 
         def draw(page):
             seen.append(page)
-            page.locator("#nothing" if len(seen) <= times else "p").wait_for(timeout=200)
+            if len(seen) <= times:
+                page.locator("#nothing").wait_for(timeout=200)
             return chromium.screenshot(page)
 
         return chromium.drawn({"index.html": "<p>one"}, 50, 40, draw)
