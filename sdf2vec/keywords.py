@@ -37,7 +37,7 @@ class FitKeywords(TypedDict, total=False):
     seed: int
     device: Literal["auto", "cpu", "cuda", "mps"]
     union: int
-    paint: Literal["flat", "linear", "radial"]
+    paint: Literal["flat", "linear", "radial", "linear3", "radial3"]
     min_area: float | None
     max_falloff: float | None
     start: str | PathLike[str] | Scene | None

@@ -13,30 +13,32 @@ from typing import NamedTuple
 from .expr import Expr, clamp, dot, length, mix
 from .function import function
 from .operation import FLOAT, VEC2, VEC3
-from .units import COLOR, DIRECTION, RISE, SHIFT, Parameter
+from .units import COLOR, DIRECTION, RISE, SHIFT, STOP, Parameter
+
+Stops = tuple[
+    tuple[float, tuple[float, float, float]], ...
+]  # shares of the way, rising, and the colours there
 
 
 class Ramp(NamedTuple):
     """A linear gradient: how it rises from 0 to 1 along the axes of a shape's frame, what it is in the frame's middle,
-    its colours at 0 and at 1.
+    its colours from 0 to 1.
     """
 
     slope: tuple[float, float]
     middle: float
-    first: tuple[float, float, float]
-    last: tuple[float, float, float]
+    stops: Stops
 
 
 class Rings(NamedTuple):
     """A radial gradient: where it is lowest in a shape's frame, how it rises to 1 from there along both axes, what it
-    is there, its colours at 0 and at 1.
+    is there, its colours from 0 to 1.
     """
 
     focus: tuple[float, float]
     slope: tuple[float, float]
     lowest: float
-    first: tuple[float, float, float]
-    last: tuple[float, float, float]
+    stops: Stops
 
 
 @dataclass(frozen=True, eq=False)
@@ -65,17 +67,45 @@ class Paint:
 BASE = Parameter("color", COLOR, (0.0, 0.0, 0.0))
 
 
+def along(q: Expr, direction: Expr, shift: Expr) -> Expr:
+    """How far a point is along a direction of the shape's frame: without a shift one half in its middle."""
+    return 0.5 + shift + dot(q, direction)
+
+
+def around(q: Expr, focus: Expr, steepness: Expr, shift: Expr) -> Expr:
+    """How far a point is from another one of the shape's frame, by ellipses around it."""
+    return shift + length((q - focus) * steepness)
+
+
+def two_colors(share: Expr, color: Expr, color_end: Expr) -> Expr:
+    """From one colour at 0 to another at 1."""
+    return mix(color, color_end, clamp(share, 0.0, 1.0))
+
+
+@function("threeColors", share=FLOAT, color=VEC3, color_middle=VEC3, color_end=VEC3, stop=FLOAT)
+def three_colors(share: Expr, color: Expr, color_middle: Expr, color_end: Expr, stop: Expr) -> Expr:
+    """From one colour at 0 to another at a stop, and from there to a third one at 1."""
+    return two_colors((share - stop) / (1.0 - stop), two_colors(share / stop, color, color_middle), color_end)
+
+
 @function("linearPaint", q=VEC2, color=VEC3, color_end=VEC3, direction=VEC2, shift=FLOAT)
 def linear_paint(q: Expr, color: Expr, color_end: Expr, direction: Expr, shift: Expr) -> Expr:
-    """From one colour to another along a direction of the shape's frame; without a shift half of each at its middle."""
-    return mix(color, color_end, clamp(0.5 + shift + dot(q, direction), 0.0, 1.0))
+    """From one colour to another along a direction of the shape's frame."""
+    return two_colors(along(q, direction, shift), color, color_end)
 
 
 @function("radialPaint", q=VEC2, color=VEC3, color_end=VEC3, focus=VEC2, steepness=VEC2, shift=FLOAT)
 def radial_paint(q: Expr, color: Expr, color_end: Expr, focus: Expr, steepness: Expr, shift: Expr) -> Expr:
-    """From the colour at a point of the shape's frame to another one along ellipses around it."""
-    return mix(color, color_end, clamp(shift + length((q - focus) * steepness), 0.0, 1.0))
+    """From the colour at a point of the shape's frame to another one around it."""
+    return two_colors(around(q, focus, steepness, shift), color, color_end)
 
+
+END = Parameter("color_end", COLOR, (0.0, 0.0, 0.0))
+MIDDLE = Parameter("color_middle", COLOR, (0.0, 0.0, 0.0))
+WHERE = Parameter("stop", STOP, (0.5,))
+SHIFTED = Parameter("shift", SHIFT, optional=True, since=2)
+ALONG = Parameter("direction", DIRECTION, (0.5, 0.0)), SHIFTED
+AROUND = Parameter("focus", SHIFT, (0.0, 0.0)), Parameter("steepness", RISE, (1.0, 1.0)), SHIFTED
 
 PAINTS: dict[str, Paint] = {
     paint.name: paint
@@ -84,26 +114,35 @@ PAINTS: dict[str, Paint] = {
         Paint(
             "linear",
             linear_paint,
-            (
-                Parameter("color_end", COLOR, (0.0, 0.0, 0.0)),
-                Parameter("direction", DIRECTION, (0.5, 0.0)),
-                Parameter("shift", SHIFT, optional=True, since=2),
-            ),
-            gradient=lambda color, color_end, direction, shift: Ramp(
-                direction, 0.5 + shift, color, color_end
-            ),
+            (END, *ALONG),
+            lambda color, end, direction, shift: Ramp(direction, 0.5 + shift, ((0.0, color), (1.0, end))),
         ),
         Paint(
             "radial",
             radial_paint,
-            (
-                Parameter("color_end", COLOR, (0.0, 0.0, 0.0)),
-                Parameter("focus", SHIFT, (0.0, 0.0)),
-                Parameter("steepness", RISE, (1.0, 1.0)),
-                Parameter("shift", SHIFT, optional=True, since=2),
+            (END, *AROUND),
+            lambda color, end, focus, steepness, shift: Rings(
+                focus, steepness, shift, ((0.0, color), (1.0, end))
             ),
-            gradient=lambda color, color_end, focus, steepness, shift: Rings(
-                focus, steepness, shift, color, color_end
+        ),
+        Paint(
+            "linear3",
+            lambda q, color, middle, end, stop, *line: three_colors(
+                along(q, *line), color, middle, end, stop
+            ),
+            (MIDDLE, END, WHERE, *ALONG),
+            lambda color, middle, end, stop, direction, shift: Ramp(
+                direction, 0.5 + shift, ((0.0, color), (stop, middle), (1.0, end))
+            ),
+        ),
+        Paint(
+            "radial3",
+            lambda q, color, middle, end, stop, *rings: three_colors(
+                around(q, *rings), color, middle, end, stop
+            ),
+            (MIDDLE, END, WHERE, *AROUND),
+            lambda color, middle, end, stop, focus, steepness, shift: Rings(
+                focus, steepness, shift, ((0.0, color), (stop, middle), (1.0, end))
             ),
         ),
     )

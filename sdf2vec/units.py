@@ -22,6 +22,7 @@ LEAST_SMOOTHNESS = 1e-3  # scene units: of a join that is smooth at all
 HIGHEST_FREQUENCY = 60.0  # radians per scene unit
 STEEPEST = 10.0  # of a gradient: ranges of colour across half a shape
 FARTHEST = 6.0  # of those by which its middle is off that of the shape
+NEAREST_STOP = 0.02  # shares of a gradient, of its middle colour to one at an end
 FAINTEST = 0.02  # opacity where colours are not signed: below it a shape would stop learning
 GRAIN = 0.001  # scene units: falloffs much below it are packed in equal steps
 GEOMETRY_DECIMALS = 6
@@ -377,6 +378,15 @@ RISE = Unit(  # of a gradient to all sides
     0.06,
     _always_within(0.0, STEEPEST),
     Codec(_between("rise")),
+    _start_alike,
+)
+STOP = Unit(  # where a gradient has its middle colour
+    "stop",
+    NEAREST_STOP,
+    1.0 - NEAREST_STOP,
+    0.02,
+    _always_within(NEAREST_STOP, 1.0 - NEAREST_STOP),
+    Codec(_between("stop")),
     _start_alike,
 )
 COLOR = Unit(

@@ -14,7 +14,16 @@ FIRST_COMPACT = (
     "iXNkZgH6HvgGP/////7j08sezKA2ad2XDyAAMW/wAAAGMYx/3p/9Pvxn/en/en/O//en+eP3v+On/6I2r//yP/2f/gDg07aKJFpFLtpP/9/JZXMxd8"
     "4CMkRdOfR5g2LH"
 )
-PAINTED = ("flat", "linear", "flat", "radial")  # one layer after the other
+PAINTED = (
+    "flat",
+    "linear",
+    "flat",
+    "radial",
+    "flat",
+    "linear3",
+    "flat",
+    "radial3",
+)  # one layer after the other
 SOFT = tuple(name for name in KINDS if name not in PATCHES)  # kinds with a soft edge, which can be joined
 
 
@@ -37,6 +46,11 @@ def random_shape(kind: str, r: random.Random, lowest: float = 0.0, paint: str = 
         *end, across, down, shift = gradient()
         return (*end, across, down, 1.0 + 0.5 * across, 1.0 - 0.5 * down, shift)
 
+    def with_middle(own):
+        end, numbers = own[:3], own[3:]
+        other = random.Random(first[0])  # of its own: what is drawn after it stays the same
+        return (*(other.uniform(lowest, 1) for _ in range(3)), *end, other.uniform(0.1, 0.9), *numbers)
+
     numbers = {
         "circle": lambda: (x, y, size),
         "ellipse": lambda: (x, y, size, size * r.uniform(0.2, 1.2), r.uniform(-7, 7)),
@@ -56,8 +70,8 @@ def random_shape(kind: str, r: random.Random, lowest: float = 0.0, paint: str = 
         "gaussian": patch,
         "gabor": lambda: (*patch(), r.uniform(-40, 40), r.uniform(0, 6)),
     }[kind]()
-    own = {"flat": tuple, "linear": gradient, "radial": rings}[paint]()
-    return Shape(kind, numbers, first, paint, own)
+    own = {"flat": tuple, "linear": gradient, "radial": rings}[paint.rstrip("3")]()
+    return Shape(kind, numbers, first, paint, with_middle(own) if paint.endswith("3") else own)
 
 
 def random_layer(
@@ -112,9 +126,9 @@ FAMILIES: dict[str, list[Structure]] = {
     "union": [(Part("circle"), Part("triangle", "linear", "union")), (Part("ellipse", "linear"),)],
     "cut": [
         (Part("box", "linear"), Part("circle", join="subtraction"), Part("ellipse", join="intersection")),
-        (Part("displaced"),),
+        (Part("displaced", "linear3"),),
     ],
-    "patches": [(Part("gaussian", "radial"),), (Part("gabor"),)],
+    "patches": [(Part("gaussian", "radial"),), (Part("gabor", "radial3"),)],
 }
 
 

@@ -98,9 +98,10 @@ def test_the_ramp_is_where_the_colours_end(direction, shift):
     assert gradient is not None
     ramp = gradient(FIRST, LAST, direction, shift)
     assert isinstance(ramp, Ramp)
-    slope, middle, first, last = ramp
+    slope, middle, stops = ramp
     steepness = slope[0] ** 2 + slope[1] ** 2
-    for side, color in ((0.0 - middle, first), (1.0 - middle, last)):
+    for share, color in stops:
+        side = share - middle
         point = (side * slope[0] / steepness, side * slope[1] / steepness)
         found = linear_paint(vec2(*point), vec3(*FIRST), vec3(*LAST), vec2(*direction), const(shift))
         assert [constant(part) for part in scalarize(found)] == pytest.approx(color)
@@ -133,8 +134,8 @@ def test_the_rings_are_where_the_colours_end(turn, shift):
     assert gradient is not None
     rings = gradient(FIRST, LAST, (0.2, -0.1), (0.3, 4.0), shift)
     assert isinstance(rings, Rings)
-    (x, y), (across, down), lowest, *colors = rings
-    assert colors == [FIRST, LAST]
+    (x, y), (across, down), lowest, stops = rings
+    assert stops == ((0.0, FIRST), (1.0, LAST))
     for share in (max(0.0, lowest), 1.0):
         reach = share - lowest
         point = (x + reach * math.cos(turn) / across, y + reach * math.sin(turn) / down)
@@ -143,6 +144,44 @@ def test_the_rings_are_where_the_colours_end(turn, shift):
         )
         wanted = [(1 - share) * first + share * last for first, last in zip(FIRST, LAST, strict=True)]
         assert [constant(part) for part in scalarize(found)] == pytest.approx(wanted)
+
+
+THIRD = (0.5, 1.0, 0.25)
+OWN = {
+    "linear3": (0.5, 0.0, 0.0),
+    "radial3": (0.0, 0.0, 1.0, 1.0, 0.0),
+}  # along x of the frame, around its middle
+
+
+@pytest.mark.parametrize("stop", [0.25, 0.6])
+def test_three_colours_along_a_line(stop):
+    """By hand: at half of the way from one stop to the next half of each colour, at the ends and beyond these alone."""
+    shape = Shape("circle", (0, 0, 0.4), FIRST, "linear3", (*THIRD, *LAST, stop, *OWN["linear3"]))
+    shares = np.array([-0.5, 0.0, stop / 2, stop, (stop + 1) / 2, 1.0, 1.5])
+    first, third, last = np.array([FIRST, THIRD, LAST])
+    want = [first, first, (first + third) / 2, third, (third + last) / 2, last, last]
+    np.testing.assert_allclose(color_at(shape, 0.8 * shares - 0.4, 0 * shares).T, want, atol=1e-6)
+
+
+def test_three_colours_around_a_point():
+    shape = Shape("circle", (0, 0, 0.4), FIRST, "radial3", (*THIRD, *LAST, 0.25, *OWN["radial3"]))
+    shares = np.array([0.0, 0.125, 0.25, 0.625, 1.0, 1.5])
+    first, third, last = np.array([FIRST, THIRD, LAST])
+    want = [first, (first + third) / 2, third, (third + last) / 2, last, last]
+    np.testing.assert_allclose(color_at(shape, 0 * shares, 0.4 * shares).T, want, atol=1e-6)
+
+
+@pytest.mark.parametrize("paint", OWN)
+def test_a_gradient_of_three_colours_has_three_stops(paint):
+    """Which are where the paint has their colours."""
+    shape = Shape("circle", (0, 0, 0.4), FIRST, paint, (*THIRD, *LAST, 0.25, *OWN[paint]))
+    gradient = PAINTS[paint].gradient
+    assert gradient is not None
+    stops = gradient(*shape.painted().values()).stops
+    assert stops == ((0.0, FIRST), (0.25, THIRD), (1.0, LAST))
+    shares = np.array([share for share, _ in stops])
+    x = 0.4 * (2 * shares - 1 if paint == "linear3" else shares)
+    np.testing.assert_allclose(color_at(shape, x, 0 * x).T, [color for _, color in stops], atol=1e-6)
 
 
 def test_all_paints_begin_with_a_colour_and_one_is_flat():

@@ -43,6 +43,7 @@ def test_the_units_of_all_parameters_are_listed():
         (units.DIRECTION, (0.5, 0.0), (0.0, 0.5)),  # in the shape's frame: of any size
         (units.SHIFT, (0.5,), (0.5,)),
         (units.RISE, (1.0, 0.5), (1.0, 0.5)),  # a quarter turn and twice the size: as it was
+        (units.STOP, (0.25,), (0.25,)),
     ],
 )
 def test_starts_by_hand(unit, values, start):
@@ -72,6 +73,8 @@ def test_starts_are_stretched_before_they_are_turned(unit, values, start):
         (units.DIRECTION, (-19.0, 0.5), (-10.0, 0.5)),
         (units.SHIFT, (7.0,), (6.0,)),
         (units.RISE, (-1.0, 19.0), (0.0, 10.0)),
+        (units.STOP, (-0.5,), (0.02,)),
+        (units.STOP, (1.5,), (0.98,)),
         (units.COLOR, (-0.5, 1.5), (0.0, 1.0)),
         (units.OPACITY, (-0.5, 1.5), (0.02, 1.0)),
         (units.FALLOFF, (0.0, 1.0), (0.1, 0.9)),

@@ -28,7 +28,7 @@ from .byte_budget import Share, within
 from .descents import Sizes, descended, fine_enough, finished, sharper, softer
 from .description import description_length
 from .digits import concise, fit_concisely
-from .drawings import Drawn, is_photograph
+from .drawings import FLAT, Drawn, is_photograph
 from .initialization import FAINTEST_GROUND, Layers, background_of, empty_groups
 from .jagged import ALIKE
 from .joining import Search
@@ -42,7 +42,8 @@ from .pruning import BRIEF, FLOOR, THOROUGH, USUAL, pruned
 from .ramps import KIND, grounded
 from .repainting import ground_shade, repainted
 from .settings import AUTO, Settings, preset_of
-from .shading import Gradient, Shading
+from .shades import Gradient
+from .shading import Shading
 from .simplify import sharing, simplified
 from .sparse import Round, grow, needed, taken_apart
 from .surroundings import View, error_of
@@ -128,10 +129,12 @@ def _few(picture: Picture, settings: Settings, callback: Callback) -> Fitted | N
     if not _may_be_few(settings):
         return None
     drawn = Drawn.of(picture)
-    if not _is_searched(drawn, settings):
-        return None
-    drawn = drawn.antialiased
-    shading = Shading.of(drawn.pixels) if drawn.flat else None
+    shading = None if drawn.flat else Shading.of(drawn.pixels, FLAT)
+    if shading is None:
+        if not _is_searched(drawn, settings):
+            return None
+        drawn = drawn.antialiased
+        shading = Shading.of(drawn.pixels) if drawn.flat else None
     if shading is None:
         return _searched(drawn, settings, callback)
     ground = _ground_shade(shading, settings)

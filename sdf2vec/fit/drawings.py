@@ -79,8 +79,8 @@ class Drawn:
         return replace(self, pixels=pixels, off=off, unsure=unsure)
 
     def flattened(self, picture: Picture) -> Drawn:
-        """The same without its gradients."""
-        return replace(self, picture=picture, pixels=picture.premultiplied)
+        """The same without its gradients, in flat colours."""
+        return replace(self, picture=picture, pixels=picture.premultiplied, flat=True)
 
     def wanted(self, target_psnr: float | None) -> tuple[Float32Array, float]:
         """The pixels that are looked for and the mean squared error that any scene may have: what these leave unsure,

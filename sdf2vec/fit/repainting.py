@@ -19,9 +19,12 @@ from ..render.reference import canvas, layers_at
 from ..render.tensors import SceneTensors, from_scene
 from ..scene import Layer, Scene, Shape
 from ..shapes import KINDS
+from .bends import BentShade
+from .color_stops import ColorStops
 from .ramps import KIND, MARGIN, PAINT
 from .rings import RadialShade
-from .shading import Gradient, Shading
+from .shades import Gradient
+from .shading import Shading
 
 LOOKED = 128  # pixels squared, at which is told which regions are seen of a layer
 NEAR = 0.1  # how far a channel of its colour may be from that of the region
@@ -105,6 +108,8 @@ def _graded(shape: Shape, shade: Gradient, size: tuple[float, float]) -> Shape:
     back = np.linalg.inv(np.stack([right - middle, down - middle], axis=1))  # from the frame to the scene
     if isinstance(shade, RadialShade):
         return _ringed(shape, shade, middle, back)
+    if isinstance(shade, BentShade):
+        return _bent(shape, shade, middle, back, size)
     place = (shade.place - 0.5) * size
     slopes = shade.slopes[:, :3] / np.array(size)[:, None]
     axes, strengths, changes = np.linalg.svd(back.T @ slopes, full_matrices=False)
@@ -126,20 +131,45 @@ def _ringed(shape: Shape, rings: RadialShade, middle: Float64Array, back: Float6
 
     Ellipses along other axes than the frame's are as steep along these.
     """
-    (near, far), stretched = rings.span, np.diag([1.0, rings.squeeze]) @ back
+    near, far = rings.stops.values[[0, -1]]
+    stretched = np.diag([1.0, rings.squeeze]) @ back
     focus = middle + np.linalg.solve(back, (rings.place - 0.5) * rings.sides)
     steepness = np.linalg.norm(stretched, axis=0) / (far - near)
-    first, last = ((rings.color + away * rings.change)[:3].clip(0.0, 1.0) for away in rings.span)
     shares = np.linalg.norm((GRID - focus) * steepness, axis=1) - near / (far - near)
-    shown = first + shares.clip(0.0, 1.0)[:, None] * (last - first)
-    middle_color = shown[len(GRID) // 2]
-    if np.abs(shown - middle_color).max() <= UNSEEN:
-        return replace(shape, color=tuple(middle_color.tolist()))
-    own = {"color_end": last, "focus": focus, "steepness": steepness}
-    values = {name: tuple(value.tolist()) for name, value in own.items()}
-    return Shape.of(
-        shape.kind, tuple(first.tolist()), RADIAL, **shape.named(), **values, shift=-near / (far - near)
+    own = {"focus": focus, "steepness": steepness, "shift": -near / (far - near)}
+    return _told(shape, rings.stops, shares, own, RADIAL)
+
+
+def _bent(
+    shape: Shape, shade: BentShade, middle: Float64Array, back: Float64Array, size: tuple[float, float]
+) -> Shape:
+    """A shape that shows a gradient of several colours; `middle` and `back` as for rings."""
+    near, far = shade.stops.values[[0, -1]]
+    slope = shade.direction / size
+    direction = back.T @ slope / (far - near)
+    start = (shade.direction.sum() / 2 - back @ middle @ slope - near) / (far - near)
+    return _told(
+        shape, shade.stops, start + GRID @ direction, {"direction": direction, "shift": start - 0.5}, PAINT
     )
+
+
+def _told(
+    shape: Shape, stops: ColorStops, shares: Float64Array, own: dict[str, Float64Array | float], paint: str
+) -> Shape:
+    """A shape in a paint of as many colours as there are stops, which are where the paint's numbers `own` say; in one,
+    if it shows hardly more: `shares` of the way from the first stop to the last [P].
+    """
+    near, far = stops.values[[0, -1]]
+    shown = stops.at(near + shares * (far - near)).clip(0.0, 1.0)
+    middle = shown[len(GRID) // 2, :3]
+    if np.abs(shown[:, :3] - middle).max() <= UNSEEN:
+        return replace(shape, color=tuple(middle.tolist()))
+    first, *between, last = (tuple(color[:3].tolist()) for color in stops.colors.clip(0.0, 1.0))
+    numbers = {name: np.asarray(value).tolist() for name, value in own.items()}
+    if between:
+        paint += str(len(stops.colors))
+        numbers |= {"color_middle": between[0], "stop": float((stops.values[1] - near) / (far - near))}
+    return Shape.of(shape.kind, first, paint, **shape.named(), color_end=last, **numbers)
 
 
 @cache

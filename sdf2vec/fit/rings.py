@@ -6,32 +6,29 @@ from typing import NamedTuple
 
 import numpy as np
 from scipy import ndimage
-from scipy.optimize import least_squares
 
 from ..arrays import BoolArray, Float32Array, Float64Array
+from .color_stops import ColorStops, main_axis, nearest_stops
 
-LEAST = 200  # pixels of a region: fewer are like rings of some gradient by chance
+LEAST = 200  # pixels of a region: fewer are like a gradient of some kind by chance
 LOOKED = 3000  # pixels that are looked at
 SMOOTH = 2.0  # pixels, of the standard deviation of a blur that takes away the steps of eight bits
 STEEP = 0.3  # share of the largest slopes, of those that point to the middle
 ROUND = 8.0  # times the one axis of an ellipse, that the other may be
 FARTHEST = 3.0  # shorter sides of the picture, from a region's middle to that of its rings
 MOSTLY = 0.5  # of the pixels lie where colours change, at least: else it is one colour that ends softly
-TIP = 0.015  # the same, of what is too near to the middle of rings to be smooth
-SCALES, MOST_STEPS, TINY = (0.1, 0.1, 0.3, 0.1, 0.1), 60, 1e-3  # of the search: of its numbers; in it
+TIP = 0.015  # shorter sides: what is too near to the middle of rings to be smooth
+SCALES, TINY = (0.1, 0.1, 0.3), 1e-3  # of the search: of its numbers; of weights
 
 
 class RadialShade(NamedTuple):
-    """Premultiplied colours [C] at a place (x, y), by shares of the sides, and how much they change for each unit of
-    the distance from there: in shares of the shorter side, of which that along y counts `squeeze` times. They change
-    between two distances, `span`, alone. `sides`: width and height, in the same unit.
+    """Premultiplied colours by the distance from a place (x, y), by shares of the sides: in shares of the shorter side,
+    of which that along y counts `squeeze` times. `sides`: width and height, in the same unit.
     """
 
     place: Float32Array
-    color: Float32Array
-    change: Float32Array
     squeeze: float
-    span: tuple[float, float]
+    stops: ColorStops
     sides: tuple[float, float]
 
     @property
@@ -40,64 +37,56 @@ class RadialShade(NamedTuple):
         return False
 
     @property
+    def color(self) -> Float32Array:
+        """One that it has [C]."""
+        return self.stops.middle
+
+    @property
     def axis(self) -> Float32Array:
         """The direction [C] in which its colours lie."""
-        found: Float32Array = self.change / np.linalg.norm(self.change)
-        return found
+        return self.stops.axis
 
     def at(self, x: Float32Array, y: Float32Array) -> Float32Array:
         """The colour there [..., C]."""
         away = np.hypot(
             (x - self.place[0]) * self.sides[0], (y - self.place[1]) * self.sides[1] * self.squeeze
         )
-        found: Float32Array = (self.color + away.clip(*self.span)[..., None] * self.change).astype(np.float32)
-        return found
+        return self.stops.at(away)
 
 
-def rings_of(inside: BoolArray, pixels: Float32Array) -> RadialShade | None:
-    """The radial gradient that is nearest to what is inside [H, W] of a picture [H, W, C]; None for too few pixels,
-    or where most are of one colour.
+def rings_of(inside: BoolArray, pixels: Float32Array, count: int = 2) -> RadialShade | None:
+    """The radial gradient of so many colours that is nearest to what is inside [H, W] of a picture [H, W, C]; None for
+    too few pixels, where most are of one colour, or where its middle is far away.
     """
     if inside.sum() < LEAST:
         return None
     height, width = inside.shape
-    sides = width / min(height, width), height / min(height, width)
+    unit = min(height, width)
     rows, columns = np.nonzero(inside)
-    share = _along_one(pixels[inside])
-    x, y = (columns + 0.5) / min(height, width), (rows + 0.5) / min(height, width)
-    start = _middle(inside, share, min(height, width))
+    colors = pixels[inside]
+    x, y = (columns + 0.5) / unit, (rows + 0.5) / unit
+    start = _middle(inside, (colors - colors.mean(axis=0)) @ main_axis(colors), unit)
     some = np.linspace(0, len(x) - 1, min(len(x), LOOKED)).astype(int)
-    found = _fitted(x[some], y[some], share[some], start)
-    if found is None:
+    numbers, stops = nearest_stops(
+        lambda numbers: _distances(x[some], y[some], numbers), start, SCALES, colors[some], count
+    )
+    if np.abs(numbers[:2] - [x.mean(), y.mean()]).max() > FARTHEST or abs(numbers[2]) > np.log(ROUND):
         return None
-    middle, squeeze, span = found
-    away = np.hypot(x - middle[0], (y - middle[1]) * squeeze)
-    if np.mean((away > span[0]) & (away < span[1])) < MOSTLY:
+    away = _distances(x, y, numbers)
+    stops = stops.within(0.0 if away.min() < TIP else float(away.min()), float(away.max()))
+    if stops.changing(away) < MOSTLY:
         return None
-    away = away.clip(*span)
-    terms = np.stack([np.ones_like(away), away], axis=1)
-    color, change = np.linalg.lstsq(terms, pixels[inside].astype(np.float64))[0].astype(np.float32)
-    return RadialShade(np.array(middle / sides, np.float32), color, change, squeeze, span, sides)
-
-
-def _along_one(colors: Float32Array) -> Float64Array:
-    """Colours [P, C] as one number each, along the direction in which they differ most."""
-    away = (colors - colors.mean(axis=0)).astype(np.float64)
-    found: Float64Array = away @ np.linalg.svd(away.T @ away)[0][:, 0]
-    return found
+    sides = width / unit, height / unit
+    return RadialShade(np.array(numbers[:2] / sides, np.float32), float(np.exp(numbers[2])), stops, sides)
 
 
 def _middle(inside: BoolArray, share: Float64Array, unit: int) -> Float64Array:
-    """Where slopes point to, x and y, and how many times that along y counts: by least squares.
+    """Where slopes point to, x and y, and the logarithm of how many times that along y counts: by least squares.
 
     Along a slope (u, v) from the middle (a, b) of ellipses k² (y − b) u = (x − a) v.
     """
-    plane = np.zeros(inside.shape)
-    plane[inside] = share
-    weight = ndimage.gaussian_filter(inside.astype(float), SMOOTH)
-    smooth = ndimage.gaussian_filter(plane, SMOOTH) / np.maximum(weight, TINY)
+    across, down = smooth_slopes(inside, share)
     core = ndimage.binary_erosion(inside, np.ones((3, 3)), iterations=round(SMOOTH))
-    down, across = np.gradient(smooth)
     steep = np.hypot(across, down)
     core &= steep > STEEP * np.quantile(steep[core], 0.95) if core.any() else core
     rows, columns = np.nonzero(core if core.sum() >= LEAST // 2 else inside)
@@ -107,32 +96,18 @@ def _middle(inside: BoolArray, share: Float64Array, unit: int) -> Float64Array:
     squared, moved, a = np.linalg.lstsq(terms, v * x)[0]
     if not ROUND**-2 < squared < ROUND**2:  # of circles, which hang on fewer numbers
         a, b = np.linalg.lstsq(np.stack([v, -u], axis=1), v * x - u * y)[0]
-        return np.array([a, b, 1.0])
-    return np.array([a, moved / squared, np.sqrt(squared)])
+        return np.array([a, b, 0.0])
+    return np.array([a, moved / squared, np.log(squared) / 2])
 
 
-def _fitted(
-    x: Float64Array, y: Float64Array, share: Float64Array, start: Float64Array
-) -> tuple[Float64Array, float, tuple[float, float]] | None:
-    """The middle, what along y counts, and between which distances numbers [P] at places [P] change; None where the
-    middle is far away.
-    """
-
-    def off(numbers: Float64Array) -> Float64Array:
-        away = _distances(x, y, numbers).clip(numbers[3], max(numbers[4], numbers[3] + TINY))
-        away -= away.mean()
-        left: Float64Array = share - share.mean() - (away @ share) / max(away @ away, TINY**2) * away
-        return left
-
-    begin = np.array([start[0], start[1], np.log(start[2]), 0.0, 0.0])
-    begin[3:] = np.quantile(_distances(x, y, begin), (0.02, 0.98))
-    solved = least_squares(off, begin, x_scale=SCALES, max_nfev=MOST_STEPS).x
-    if np.abs(solved[:2] - [x.mean(), y.mean()]).max() > FARTHEST or abs(solved[2]) > np.log(ROUND):
-        return None
-    away = _distances(x, y, solved)
-    least = 0.0 if away.min() < TIP else float(away.min())
-    low, high = max(float(solved[3]), least), min(float(solved[4]), float(away.max()))
-    return (solved[:2], float(np.exp(solved[2])), (low, high)) if high > low else None
+def smooth_slopes(inside: BoolArray, values: Float64Array) -> tuple[Float64Array, Float64Array]:
+    """The slopes of values [P] at what is inside [H, W] along x and y, [H, W], without the steps of eight bits."""
+    plane = np.zeros(inside.shape)
+    plane[inside] = values
+    weight = ndimage.gaussian_filter(inside.astype(float), SMOOTH)
+    smooth = ndimage.gaussian_filter(plane, SMOOTH) / np.maximum(weight, TINY)
+    down, across = np.gradient(smooth)
+    return across, down
 
 
 def _distances(x: Float64Array, y: Float64Array, numbers: Float64Array) -> Float64Array:

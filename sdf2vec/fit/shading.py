@@ -1,7 +1,7 @@
 """Gradients of a picture, taken out of it: shapes that run from one colour to another are searched in one colour.
 
-Where a region of the picture is a plane in its colours, or these change with the distance from a point alone, all of
-it gets one of these, and what lies beside it or on it stays: the picture is flat then. `repainting` puts the gradients
+Where colours change along one direction of a region of the picture, or with the distance from a point alone, all of it
+gets one of these, and what lies beside it or on it stays: the picture is flat then. `repainting` puts the gradients
 into the shapes that were found.
 """
 
@@ -17,60 +17,34 @@ from scipy import ndimage
 
 from ..arrays import BoolArray, Float32Array, IntArray
 from ..image import Picture, unpremultiply
-from .region_graph import connected, largest
-from .rings import RadialShade, rings_of
-from .slopes import BENT, even
+from .gradient_regions import UNLIKE, regions_of
+from .shades import Gradient
+from .slopes import even
 from .views import scaled
 from .windows import Part, Sides, extent, larger, widened
 
 WHITE = 255  # levels
 LOOKED = 320  # pixels squared, at which regions are looked for
-PLANE, NEARLY = 2.2 / 255, 0.98  # how far a region is from a plane at most; share of it that is as near
-BENDS = 0.06  # how far it may be, too, by what its colour changes: as where there is a third one in between
-SMALLEST = 3  # pixels of a side, for anything to be even
-LEAST, LEAST_SHADED = 9, 60  # pixels of a region; of one that is no single colour
-CHANGES = 6.0 / 255  # of a colour across a region, at least, of a gradient
-ALIKE = 3.0 / 255  # how far two regions of one plane are from it, at most
 REACH = 3  # pixels beyond a region that its edge may show in
 AROUND = 5  # pixels squared where an edge goes from one colour to the other
 # length of the difference of two colours that are one, in a region at its edge, and where it may be no plane
 NOISE, BENT_AWAY = 3.0 / 255, 16.0 / 255
-UNLIKE = 6.0 / 255  # from the region's colour, of an edge's other one
 CLEAR = 0.7  # share of the difference of two regions that is left without gradients, at least, if it can be
 SHARP = 0.7  # share of what lies beyond a region's edge that is another region, at least
 
 EVERYWHERE: Part = slice(None), slice(None)
 
 
-class Shade(NamedTuple):
-    """A premultiplied colour [C] at a place (x, y) and its slopes along both axes [2, C], by shares of the sides."""
+class Seen(NamedTuple):
+    """What is seen of a gradient in a part of a picture [h, w]: which share of each pixel, by how much its colour [C]
+    without the gradient differs from that with it [h, w, C]; where nothing else is seen.
+    """
 
-    place: Float32Array
+    part: Part
+    share: Float32Array
+    change: Float32Array
+    is_all: BoolArray
     color: Float32Array
-    slopes: Float32Array
-
-    @property
-    def is_flat(self) -> bool:
-        """Whether it is one colour."""
-        return not self.slopes.any()
-
-    @property
-    def axis(self) -> Float32Array:
-        """The direction [C] in which its colours lie."""
-        found: Float32Array = np.linalg.svd(self.slopes, full_matrices=False)[2][0]
-        return found
-
-    def at(self, x: Float32Array, y: Float32Array) -> Float32Array:
-        """The colour there [..., C]."""
-        found: Float32Array = (
-            self.color
-            + (x - self.place[0])[..., None] * self.slopes[0]
-            + (y - self.place[1])[..., None] * self.slopes[1]
-        )
-        return found
-
-
-Gradient = Shade | RadialShade
 
 
 @dataclass(frozen=True, eq=False)
@@ -87,11 +61,13 @@ class Shading:
     calm: BoolArray
 
     @classmethod
-    def of(cls, pixels: Float32Array) -> Shading | None:
-        """That of pixels [H, W, C]; None where no region of them is a gradient with sharp edges."""
+    def of(cls, pixels: Float32Array, least: float = 0.0) -> Shading | None:
+        """That of pixels [H, W, C]; None where no region of them is a gradient with sharp edges, or regions are less
+        than a share of the picture.
+        """
         small = scaled(pixels, LOOKED).permute(1, 2, 0).numpy()
         calm = even(small)
-        labels, shades = _regions(small, calm)
+        labels, shades = regions_of(small, calm, least)
         found = cls(pixels, labels, tuple(shades), calm)
         return found if found.graded else None
 
@@ -149,24 +125,29 @@ class Shading:
     def flattened(self) -> Picture:
         """The picture without its gradients: each is of a colour that it has."""
         before = self.pixels
-        flat = before.copy()
-        for number in self.graded:
-            self._flatten(number, before, flat)
+        flat, taken = before.copy(), np.zeros(before.shape[:2], np.float32)
+        seen = [self._seen(number) for number in self.graded]
+        for each in seen:
+            taken[each.part] += each.share
+        for each in seen:
+            flat[each.part] += (each.share / taken[each.part].clip(min=1.0))[..., None] * each.change
+        for each in seen:
+            flat[each.part][each.is_all] = each.color
         flat = flat.clip(0.0, 1.0)
         return Picture(unpremultiply(flat) if flat.shape[2] == 4 else flat)
 
-    def _flatten(self, number: int, before: Float32Array, flat: Float32Array) -> None:
-        """Puts a colour in the place of a gradient of a picture [H, W, C], `flat`."""
-        sides, small = before.shape[:2], self.labels.shape
+    def _seen(self, number: int) -> Seen:
+        """How much is seen of a gradient, and where."""
+        sides, small = self.pixels.shape[:2], self.labels.shape
         own = self.labels == number
         around = ndimage.binary_dilation(own, iterations=REACH)
         part = larger(widened(extent(around), 1, small), sides, small)
         own, around = (mask[_resized(small, sides, part)] for mask in (own, around))
         shown, color = self.shades[number - 1].at(*_places(sides, part)), self.flats[number - 1]
-        apart = np.linalg.norm(before[part] - shown, axis=2)
+        apart = np.linalg.norm(self.pixels[part] - shown, axis=2)
         near = ndimage.maximum_filter(around & (apart <= UNLIKE), 2 * REACH + 1)
-        flat[part] += _share(apart, near)[..., None] * (color - shown)
-        flat[part][near & (apart <= np.where(own, BENT_AWAY, NOISE))] = color
+        is_all = near & (apart <= np.where(own, BENT_AWAY, NOISE))
+        return Seen(part, _share(apart, near), color - shown, is_all, color)
 
 
 def _places(sides: Sides, part: Part = EVERYWHERE) -> tuple[Float32Array, Float32Array]:
@@ -206,82 +187,3 @@ def _is_sharp(labels: IntArray, number: int, calm: BoolArray) -> bool:
     edge = ndimage.binary_dilation(inside, square) & ~inside
     has_edge = calm[edge].mean() <= 1.0 - SHARP
     return float(((labels > 0) | (calm & has_edge))[beyond].mean()) >= SHARP
-
-
-# --- regions --------------------------------------------------------------------------------------------------
-
-
-def _regions(pixels: Float32Array, calm: BoolArray) -> tuple[IntArray, list[Gradient]]:
-    """The regions of a picture [H, W, C] that are gradients or one colour, by number from 1, and what these are, the
-    largest first; `calm`: where it is even [H, W].
-    """
-    labels, shades = np.zeros(pixels.shape[:2], np.int64), list[Gradient]()
-    x, y = np.broadcast_arrays(*_places(pixels.shape[:2]))
-    for inside in _smooth(pixels, calm):
-        shade = _gradient(inside, x[inside], y[inside], pixels)
-        if shade is None:
-            continue
-        same = (
-            number
-            for number, other in enumerate(shades, 1)
-            if other.is_flat == shade.is_flat
-            and np.abs(other.at(x[inside], y[inside]) - pixels[inside]).max(axis=1).mean() < ALIKE
-        )
-        number = next(same, len(shades) + 1)
-        if number > len(shades):
-            shades.append(shade)
-        labels[inside] = number
-    return labels, shades
-
-
-def _smooth(pixels: Float32Array, calm: BoolArray) -> Iterator[BoolArray]:
-    """Masks [H, W] of connected pixels of a picture where colours hardly bend, and change the same way; the largest
-    first.
-    """
-    if min(pixels.shape[:2]) < SMALLEST:
-        return
-    slopes = np.concatenate([np.gradient(pixels, axis=axis) for axis in (0, 1)], axis=2)
-    parts = connected(calm, lambda one, other: np.abs(slopes[one] - slopes[other]).max(axis=2) <= BENT)
-    yield from largest(parts, LEAST)
-
-
-def _gradient(inside: BoolArray, x: Float32Array, y: Float32Array, pixels: Float32Array) -> Gradient | None:
-    """What is inside [H, W] of a picture, at places [P] of that: one colour, a plane, or else rings, where it is near
-    to one, and no paler here than there; rings before a plane that bends.
-    """
-    colors = pixels[inside]
-    plane = _plane(x, y, colors)
-    shown = plane.at(x, y)
-    if _is_told(shown, colors, 0.0) and np.ptp(shown, axis=0).max() < CHANGES:
-        return Shade(plane.place, np.median(colors, axis=0), np.zeros_like(plane.slopes))
-    if len(colors) < LEAST_SHADED or (colors.shape[1] == 4 and np.ptp(colors[:, 3]) > CHANGES):
-        return None
-    if _is_told(shown, colors, 0.0):
-        return plane
-    rings = rings_of(inside, pixels)
-    around = None if rings is None else rings.at(x, y)
-    if around is not None and _is_told(around, colors, 0.0):
-        return rings
-    if _is_told(shown, colors, BENDS):
-        return plane
-    return rings if around is not None and _is_told(around, colors, BENDS) else None
-
-
-def _is_told(shown: Float32Array, colors: Float32Array, bends: float) -> bool:
-    """Whether colours [P, C] are near to others, or as near as they may be of gradients that bend."""
-    allowed = max(PLANE, bends * float(np.ptp(shown, axis=0).max()))
-    return bool(np.mean(np.abs(shown - colors).max(axis=1) <= allowed) >= NEARLY)
-
-
-def _plane(x: Float32Array, y: Float32Array, colors: Float32Array) -> Shade:
-    """The plane through colours [P, C] that changes along one direction."""
-    places = np.stack([x, y], axis=1)
-    middle, mean = places.mean(axis=0), colors.mean(axis=0)
-    return Shade(middle, mean, _along_one(np.linalg.lstsq(places - middle, colors - mean)[0]))
-
-
-def _along_one(slopes: Float32Array) -> Float32Array:
-    """Slopes [2, C] as near to these as change along one direction."""
-    left, strengths, right = np.linalg.svd(slopes, full_matrices=False)
-    found: Float32Array = left[:, :1] * strengths[0] @ right[:1]
-    return found

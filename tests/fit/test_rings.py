@@ -45,7 +45,7 @@ def test_where_it_begins_and_ends():
     pixels = picture((60.0, 40.0), (60.0, 60.0), (0.3, 0.8))
     rings = rings_of(everywhere(pixels), pixels)
     assert rings is not None
-    assert np.array(rings.span) * 80 == pytest.approx([18.0, 48.0], abs=0.5)
+    assert rings.stops.values * 80 == pytest.approx([18.0, 48.0], abs=0.5)
     assert np.abs(shown(rings, pixels) - pixels).max() < 0.008
 
 

@@ -7,7 +7,8 @@ import pytest
 
 from sdf2vec.bench.known_scenes import known_scene
 from sdf2vec.fit.rings import RadialShade
-from sdf2vec.fit.shading import Shade, Shading
+from sdf2vec.fit.shades import Shade
+from sdf2vec.fit.shading import Shading
 from tests.fit.drawn import GREEN, HALF, RISE, SIDE, WHITE, box, disc, painted, ramp, rings, shading_of
 
 

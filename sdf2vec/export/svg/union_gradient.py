@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ...arrays import Float64Array
-from ...paints import PAINTS, Ramp, Rings
+from ...paints import PAINTS, Ramp, Rings, Stops
 from ...scene import Color, Layer, Shape
 from .canvas import Canvas, pairs
 from .display import Fill, LinearGradient, RadialGradient, Stop, moved
@@ -69,24 +69,26 @@ def _linear(ramp: Ramp, frame: ShapeFrame, canvas: Canvas, lift: float) -> Fill:
     slope = _turned(np.array(ramp.slope) / np.maximum(frame.half, FLAT), frame)
     steepness = float(slope @ slope)
     if steepness < FLAT:
-        return _mixed(ramp, ramp.middle, lift)
+        return _color_at(ramp.middle, ramp.stops, lift)
     places = frame.origin + np.outer((-ramp.middle, 1.0 - ramp.middle), slope / steepness)
     start, end = pairs(canvas.places(places))
-    return LinearGradient(start, end, (Stop(0.0, moved(ramp.first, lift)), Stop(1.0, moved(ramp.last, lift))))
+    return LinearGradient(start, end, tuple(Stop(share, moved(color, lift)) for share, color in ramp.stops))
 
 
 def _radial(rings: Rings, frame: ShapeFrame, canvas: Canvas, lift: float) -> Fill:
     """With a rim where the last colour begins, as far as a colour begins there."""
-    rise = 1.0 - rings.lowest
+    lowest, stops = rings.lowest, rings.stops
+    rise = 1.0 - lowest
     slopes = np.array(rings.slope) / np.maximum(frame.half, FLAT)
     if rise <= 0.0 or slopes.max() * FARTHEST < rise * canvas.unit:
-        return _mixed(rings, rings.lowest, lift)
+        return _color_at(lowest, stops, lift)
     radii = np.minimum(rise * canvas.unit / np.maximum(slopes, FLAT), FARTHEST)
     (center,) = pairs(canvas.places(frame.origin + _turned(np.array(rings.focus) * frame.half, frame)))
-    start = max(-rings.lowest, 0.0) / rise
-    stops = (Stop(start, _mixed(rings, rings.lowest, lift)), Stop(1.0, moved(rings.last, lift)))
+    first = max(lowest, 0.0)
+    seen = ((first, _color_at(first, stops)), *(stop for stop in stops if stop[0] > first))
+    shown = tuple(Stop((share - lowest) / rise, moved(color, lift)) for share, color in seen)
     return RadialGradient(
-        center, (float(radii[0]), float(radii[1])), stops, math.atan2(frame.axis[1], frame.axis[0])
+        center, (float(radii[0]), float(radii[1])), shown, math.atan2(frame.axis[1], frame.axis[0])
     )
 
 
@@ -96,10 +98,10 @@ def _turned(vector: Float64Array, frame: ShapeFrame) -> Float64Array:
     return np.array([across * cosine - down * sine, across * sine + down * cosine])
 
 
-def _mixed(gradient: Ramp | Rings, share: float, lift: float) -> Color:
-    """The colour of a gradient at a share of the way, from 0 to 1."""
-    ends = zip(gradient.first, gradient.last, strict=True)
-    return moved([float(np.interp(share, (0.0, 1.0), pair)) for pair in ends], lift)
+def _color_at(share: float, stops: Stops, lift: float = 0.0) -> Color:
+    """The colour of a gradient at a share of the way."""
+    shares, colors = zip(*stops, strict=True)
+    return moved([float(np.interp(share, shares, channel)) for channel in zip(*colors, strict=True)], lift)
 
 
 def mean_color(shape: Shape) -> Color:

@@ -1,0 +1,108 @@
+"""Colours that run into each other while a number rises: those of a gradient, told from pixels."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import NamedTuple
+
+import numpy as np
+from scipy.optimize import least_squares
+
+from ..arrays import Float32Array, Float64Array
+
+MOST_STEPS, NEARER = 60, 1e-4  # of the search; shares by which the error falls in one, at least
+NEAREST = 0.05  # shares of the way, of two stops
+FIRST = 0.02, 0.98  # where the stops at the ends start, shares of the pixels
+MIDDLES = 0.3, 0.5, 0.7  # where one between them may start, shares of the way
+SCALE = 0.1  # of the way, of the search
+TINY = 1e-6
+CHANGES = 6.0 / 255  # of a colour from one stop to the next, at least, where there is a gradient
+
+Measure = Callable[[Float64Array], Float64Array]
+
+
+class ColorStops(NamedTuple):
+    """Colours [S, C] at values [S] of a number, which rise; between them they run into each other."""
+
+    values: Float64Array
+    colors: Float32Array
+
+    @property
+    def middle(self) -> Float32Array:
+        """The colour [C] half way."""
+        return self.at(np.array((self.values[0] + self.values[-1]) / 2))
+
+    @property
+    def axis(self) -> Float32Array:
+        """The direction [C] in which they differ most."""
+        return main_axis(self.colors)
+
+    def at(self, value: Float32Array | Float64Array) -> Float32Array:
+        """The colour there [..., C]."""
+        channels = [np.interp(value, self.values, channel) for channel in self.colors.T]
+        return np.stack(channels, axis=-1).astype(np.float32)
+
+    def changing(self, values: Float64Array) -> float:
+        """The share of values [P] that lie between stops of two colours, not of one."""
+        changes = np.abs(np.diff(self.colors, axis=0)).max(axis=1) >= CHANGES
+        return float(np.concatenate([[False], changes, [False]])[np.searchsorted(self.values, values)].mean())
+
+    def within(self, low: float, high: float) -> ColorStops:
+        """The same between two values, beyond which nothing is known."""
+        values = self.values.clip(low, high)
+        return ColorStops(values, self.at(values))
+
+
+def main_axis(colors: Float32Array) -> Float32Array:
+    """The direction [C] in which colours [P, C] differ most."""
+    away = (colors - colors.mean(axis=0)).astype(np.float64)
+    found: Float32Array = np.linalg.svd(away.T @ away)[0][:, 0].astype(np.float32)
+    return found
+
+
+def nearest_stops(
+    measure: Measure, start: Float64Array, scales: tuple[float, ...], colors: Float32Array, count: int
+) -> tuple[Float64Array, ColorStops]:
+    """What a number at each pixel hangs on, and the stops by which it tells colours [P, C], from `start` on: by least
+    squares.
+
+    `scales`: of each of the numbers that it hangs on. The colours are those that are best for a number: they are solved
+    for at each step of the search.
+    """
+    wanted = colors.astype(np.float64)
+
+    def off(numbers: Float64Array) -> Float64Array:
+        shares = _shares(measure(numbers[:-count]), _rising(numbers[-count:]))
+        left: Float64Array = (shares @ _solved(shares, wanted) - wanted).ravel()
+        return left
+
+    low, high = np.quantile(measure(start), FIRST)
+    inside = [()] if count == 2 else [(middle,) for middle in MIDDLES]
+    begins = [
+        np.concatenate([start, low + np.array((0.0, *middle, 1.0)) * (high - low)]) for middle in inside
+    ]
+    begin = min(begins, key=lambda numbers: float(np.square(off(numbers)).sum()))
+    step = max(float(high - low), TINY) * SCALE
+    found = least_squares(off, begin, x_scale=(*scales, *(step,) * count), ftol=NEARER, max_nfev=MOST_STEPS).x
+    values = _rising(found[-count:])
+    shares = _shares(measure(found[:-count]), values)
+    return found[:-count], ColorStops(values, _solved(shares, wanted).astype(np.float32))
+
+
+def _rising(values: Float64Array) -> Float64Array:
+    """Stops that are apart: those between the ends are no nearer to these than they may be."""
+    low, high = values[0], max(values[-1], values[0] + TINY)
+    room = NEAREST * (high - low)
+    return np.array([low, *values[1:-1].clip(low + room, high - room), high])
+
+
+def _shares(values: Float64Array, stops: Float64Array) -> Float64Array:
+    """How much of each stop's colour [S] there is at values [P], [P, S]."""
+    return np.stack([np.interp(values, stops, own) for own in np.eye(len(stops))], axis=1)
+
+
+def _solved(shares: Float64Array, colors: Float64Array) -> Float64Array:
+    """The colours [S, C] with which shares [P, S] are nearest to colours [P, C]; the mean where there is no share."""
+    mean, own = colors.mean(axis=0), shares.T @ shares + TINY * np.eye(shares.shape[1])
+    found: Float64Array = mean + np.linalg.solve(own, shares.T @ (colors - mean))
+    return found
