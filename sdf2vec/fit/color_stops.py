@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -13,7 +13,9 @@ from ..arrays import Float32Array, Float64Array
 MOST_STEPS, NEARER = 60, 1e-4  # of the search; shares by which the error falls in one, at least
 NEAREST = 0.05  # shares of the way, of two stops
 FIRST = 0.02, 0.98  # where the stops at the ends start, shares of the pixels
-MIDDLES = 0.3, 0.5, 0.7  # where one between them may start, shares of the way
+# where one between them may start, shares of the way; where there is none
+MIDDLES: Sequence[tuple[float, ...]] = (0.3,), (0.5,), (0.7,)
+NO_MIDDLE: Sequence[tuple[float, ...]] = ((),)
 SCALE = 0.1  # of the way, of the search
 TINY = 1e-6
 CHANGES = 6.0 / 255  # of a colour from one stop to the next, at least, where there is a gradient
@@ -47,10 +49,22 @@ class ColorStops(NamedTuple):
         changes = np.abs(np.diff(self.colors, axis=0)).max(axis=1) >= CHANGES
         return float(np.concatenate([[False], changes, [False]])[np.searchsorted(self.values, values)].mean())
 
+    def some(self, chosen: slice) -> ColorStops:
+        """Some of the stops alone."""
+        return ColorStops(self.values[chosen], self.colors[chosen])
+
     def within(self, low: float, high: float) -> ColorStops:
         """The same between two values, beyond which nothing is known."""
         values = self.values.clip(low, high)
         return ColorStops(values, self.at(values))
+
+    def begun(self, value: float) -> ColorStops:
+        """The same from another value on."""
+        first, second = self.values[:2]
+        color = self.colors[0] + (value - first) / (second - first) * (self.colors[1] - self.colors[0])
+        return ColorStops(
+            np.array([value, *self.values[1:]]), np.array([color, *self.colors[1:]], np.float32)
+        )
 
 
 def main_axis(colors: Float32Array) -> Float32Array:
@@ -61,15 +75,20 @@ def main_axis(colors: Float32Array) -> Float32Array:
 
 
 def nearest_stops(
-    measure: Measure, start: Float64Array, scales: tuple[float, ...], colors: Float32Array, count: int
+    measure: Measure,
+    start: Float64Array,
+    scales: tuple[float, ...],
+    colors: Float32Array,
+    middles: Sequence[tuple[float, ...]],
 ) -> tuple[Float64Array, ColorStops]:
     """What a number at each pixel hangs on, and the stops by which it tells colours [P, C], from `start` on: by least
     squares.
 
-    `scales`: of each of the numbers that it hangs on. The colours are those that are best for a number: they are solved
-    for at each step of the search.
+    `scales`: of each of the numbers that it hangs on. `middles`: where the stops between the ends may start, shares of
+    the way; from those that are nearest the search begins. The colours are those that are best for a number: they are
+    solved for at each step.
     """
-    wanted = colors.astype(np.float64)
+    wanted, count = colors.astype(np.float64), len(middles[0]) + 2
 
     def off(numbers: Float64Array) -> Float64Array:
         shares = _shares(measure(numbers[:-count]), _rising(numbers[-count:]))
@@ -77,9 +96,8 @@ def nearest_stops(
         return left
 
     low, high = np.quantile(measure(start), FIRST)
-    inside = [()] if count == 2 else [(middle,) for middle in MIDDLES]
     begins = [
-        np.concatenate([start, low + np.array((0.0, *middle, 1.0)) * (high - low)]) for middle in inside
+        np.concatenate([start, low + np.array((0.0, *middle, 1.0)) * (high - low)]) for middle in middles
     ]
     begin = min(begins, key=lambda numbers: float(np.square(off(numbers)).sum()))
     step = max(float(high - low), TINY) * SCALE
@@ -93,7 +111,8 @@ def _rising(values: Float64Array) -> Float64Array:
     """Stops that are apart: those between the ends are no nearer to these than they may be."""
     low, high = values[0], max(values[-1], values[0] + TINY)
     room = NEAREST * (high - low)
-    return np.array([low, *values[1:-1].clip(low + room, high - room), high])
+    between = np.sort(values[1:-1].clip(low + room, high - room))
+    return np.array([low, *between, high])
 
 
 def _shares(values: Float64Array, stops: Float64Array) -> Float64Array:

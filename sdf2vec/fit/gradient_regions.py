@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from itertools import chain
 from typing import NamedTuple
 
 import numpy as np
 from scipy import ndimage
 
 from ..arrays import BoolArray, Float32Array, IntArray
+from .bends import BentShade
 from .region_graph import connected, largest
 from .shades import Gradient, bent_gradient, gradient_of, places_in
 from .slopes import BENT
@@ -17,6 +19,7 @@ SMALLEST = 3  # pixels of a side, for anything to be even
 LEAST = 9  # pixels of a region
 KNEE, LEAST_KNEE = 3, 6  # pixels from where a gradient bends sharply to what is beside that; of such a place
 UNLIKE = 6.0 / 255  # from a region's colour, of what is none of it
+COLORS = 3  # of a paint
 ALIKE = 3.0 / 255  # how far two regions of one gradient are from it, at most
 
 
@@ -32,7 +35,7 @@ def regions_of(pixels: Float32Array, calm: BoolArray, least: float) -> tuple[Int
     the largest first: none, if they are less than a share of the picture. `calm`: where it is even [H, W].
     """
     labels, shades = np.zeros(pixels.shape[:2], np.int64), list[Gradient]()
-    for inside, shade in _over_knees(_told(pixels, calm, least), pixels):
+    for inside, shade in chain.from_iterable(map(_parts, _over_knees(_told(pixels, calm, least), pixels))):
         same = (
             number
             for number, other in enumerate(shades, 1)
@@ -60,8 +63,24 @@ def _told(pixels: Float32Array, calm: BoolArray, least: float) -> list[Region]:
     return found if share >= least else []
 
 
+def _parts(region: Region) -> Iterator[Region]:
+    """A region; of one with more colours than a paint may have, parts with as many of these each."""
+    inside, shade = region
+    if not isinstance(shade, BentShade) or len(shade.stops.values) <= COLORS:
+        yield region
+        return
+    values = shade.stops.values
+    along = np.full(inside.shape, np.nan)
+    along[inside] = shade.along(*places_in(inside))
+    for first in range(0, len(values) - 1, COLORS - 1):
+        own = slice(first, first + COLORS)
+        low = -np.inf if first == 0 else values[first]
+        high = np.inf if first + COLORS >= len(values) else values[first + COLORS - 1]
+        yield Region((along >= low) & (along < high), shade._replace(stops=shade.stops.some(own)))
+
+
 def _over_knees(found: list[Region], pixels: Float32Array) -> list[Region]:
-    """The same: two gradients that meet in one colour are one of three colours, if they are such."""
+    """The same: two gradients that meet in one colour are one of three colours or more, if they are such."""
     joined = list[Region]()
     for region in found:
         joined.append(region)

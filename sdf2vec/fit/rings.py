@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
 from scipy import ndimage
 
 from ..arrays import BoolArray, Float32Array, Float64Array
-from .color_stops import ColorStops, main_axis, nearest_stops
+from .color_stops import NO_MIDDLE, ColorStops, main_axis, nearest_stops
 
 LEAST = 200  # pixels of a region: fewer are like a gradient of some kind by chance
 LOOKED = 3000  # pixels that are looked at
@@ -17,7 +18,7 @@ STEEP = 0.3  # share of the largest slopes, of those that point to the middle
 ROUND = 8.0  # times the one axis of an ellipse, that the other may be
 FARTHEST = 3.0  # shorter sides of the picture, from a region's middle to that of its rings
 MOSTLY = 0.5  # of the pixels lie where colours change, at least: else it is one colour that ends softly
-TIP = 0.015  # shorter sides: what is too near to the middle of rings to be smooth
+TIP = 5.0  # pixels: what is too near to the middle of rings to be smooth
 SCALES, TINY = (0.1, 0.1, 0.3), 1e-3  # of the search: of its numbers; of weights
 
 
@@ -54,9 +55,12 @@ class RadialShade(NamedTuple):
         return self.stops.at(away)
 
 
-def rings_of(inside: BoolArray, pixels: Float32Array, count: int = 2) -> RadialShade | None:
-    """The radial gradient of so many colours that is nearest to what is inside [H, W] of a picture [H, W, C]; None for
-    too few pixels, where most are of one colour, or where its middle is far away.
+def rings_of(
+    inside: BoolArray, pixels: Float32Array, middles: Sequence[tuple[float, ...]] = NO_MIDDLE
+) -> RadialShade | None:
+    """The radial gradient that is nearest to what is inside [H, W] of a picture [H, W, C]; None for
+    too few pixels, where most are of one colour, or where its middle is far away. `middles`: where colours between its
+    ends may start, shares of the way.
     """
     if inside.sum() < LEAST:
         return None
@@ -68,12 +72,14 @@ def rings_of(inside: BoolArray, pixels: Float32Array, count: int = 2) -> RadialS
     start = _middle(inside, (colors - colors.mean(axis=0)) @ main_axis(colors), unit)
     some = np.linspace(0, len(x) - 1, min(len(x), LOOKED)).astype(int)
     numbers, stops = nearest_stops(
-        lambda numbers: _distances(x[some], y[some], numbers), start, SCALES, colors[some], count
+        lambda numbers: _distances(x[some], y[some], numbers), start, SCALES, colors[some], middles
     )
     if np.abs(numbers[:2] - [x.mean(), y.mean()]).max() > FARTHEST or abs(numbers[2]) > np.log(ROUND):
         return None
     away = _distances(x, y, numbers)
-    stops = stops.within(0.0 if away.min() < TIP else float(away.min()), float(away.max()))
+    stops = stops.within(float(away.min()), float(away.max()))
+    if away.min() * unit < TIP and stops.values[0] * unit < TIP:
+        stops = stops.begun(0.0)
     if stops.changing(away) < MOSTLY:
         return None
     sides = width / unit, height / unit

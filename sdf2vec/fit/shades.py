@@ -2,18 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from itertools import chain
 from typing import NamedTuple
 
 import numpy as np
 
 from ..arrays import BoolArray, Float32Array
-from .bends import BentShade, bend_of
-from .color_stops import CHANGES
+from .bends import NEARLY, PLANE, BentShade, bend_of, long_bends_of
+from .color_stops import CHANGES, MIDDLES, NO_MIDDLE
 from .rings import RadialShade, rings_of
 
-PLANE, NEARLY = 2.2 / 255, 0.98  # how far a region is from a gradient at most; share of it that is as near
 BENDS = 0.06  # how far it may be, too, by what its colour changes: as where there are more colours in between
 LEAST_SHADED = 60  # pixels of a region that is no single colour
 
@@ -50,8 +49,8 @@ Gradient = Shade | RadialShade | BentShade
 
 
 def gradient_of(inside: BoolArray, pixels: Float32Array) -> Gradient | None:
-    """What is inside [H, W] of a picture [H, W, C]: one colour, a plane, rings, or either of three colours, the first
-    that is near to it, if it is no paler here than there; at last what is less near.
+    """What is inside [H, W] of a picture [H, W, C]: one colour, a plane, rings, either of three colours, a line of
+    more, the first that is near to it, if it is no paler here than there; at last what is less near.
     """
     colors, (x, y) = pixels[inside], places_in(inside)
     plane = _plane(x, y, colors)
@@ -61,7 +60,7 @@ def gradient_of(inside: BoolArray, pixels: Float32Array) -> Gradient | None:
     if len(colors) < LEAST_SHADED or (colors.shape[1] == 4 and np.ptp(colors[:, 3]) > CHANGES):
         return None
     found = list[Gradient]()
-    for told in chain([plane], _radial(inside, pixels), _bent(inside, pixels)):
+    for told in chain([plane], _radial(inside, pixels), _bent(inside, pixels), long_bends_of(inside, pixels)):
         if _is_told(told.at(x, y), colors):
             return told
         found.append(told)
@@ -69,9 +68,10 @@ def gradient_of(inside: BoolArray, pixels: Float32Array) -> Gradient | None:
 
 
 def bent_gradient(inside: BoolArray, pixels: Float32Array) -> Gradient | None:
-    """The gradient of three colours that is near to what is inside; None where none is."""
+    """The gradient of three colours or more that is near to what is inside; None where none is."""
     places, colors = places_in(inside), pixels[inside]
-    return next((told for told in _bent(inside, pixels) if _is_told(told.at(*places), colors)), None)
+    found = chain(_bent(inside, pixels), long_bends_of(inside, pixels))
+    return next((told for told in found if _is_told(told.at(*places), colors)), None)
 
 
 def places_in(inside: BoolArray) -> tuple[Float32Array, Float32Array]:
@@ -82,15 +82,17 @@ def places_in(inside: BoolArray) -> tuple[Float32Array, Float32Array]:
     return x.astype(np.float32), y.astype(np.float32)
 
 
-def _radial(inside: BoolArray, pixels: Float32Array, count: int = 2) -> Iterator[RadialShade]:
-    if (rings := rings_of(inside, pixels, count)) is not None:
+def _radial(
+    inside: BoolArray, pixels: Float32Array, middles: Sequence[tuple[float, ...]] = NO_MIDDLE
+) -> Iterator[RadialShade]:
+    if (rings := rings_of(inside, pixels, middles)) is not None:
         yield rings
 
 
 def _bent(inside: BoolArray, pixels: Float32Array) -> Iterator[Gradient]:
     if (bend := bend_of(inside, pixels)) is not None:
         yield bend
-    yield from _radial(inside, pixels, 3)
+    yield from _radial(inside, pixels, MIDDLES)
 
 
 def _is_told(shown: Float32Array, colors: Float32Array, bends: float = 0.0) -> bool:

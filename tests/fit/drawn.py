@@ -19,6 +19,8 @@ KINDS = ("circle", "ellipse", "box", "triangle", "rounded_triangle", "arc")
 # of a gradient: its colour in the middle, and how much it rises from side to side
 HALF, RISE = np.array([0.5, 0.3, 0.5]), np.array([0.4, 0.2, -0.4])
 
+THREE = np.array([[0.9, 0.7, 0.2], [0.8, 0.1, 0.4], [0.2, 0.2, 0.8]])  # colours of a gradient
+
 
 def points():
     """Pixels' samples x, y [n, n]."""
@@ -55,6 +57,20 @@ def rings(x=40.0, y=30.0, reach=60.0, rise=RISE):
     """Colours [n, n, 3] of all samples that rise with the distance from a point."""
     across, down = points()
     return HALF + (np.hypot(across - x, down - y) / reach - 0.5)[..., None] * rise
+
+
+def bent(stop=0.4, steepness=1.0):
+    """Colours [n, n, 3] of all samples that run down from one over another, at a share of the way, to a third one."""
+    _, y = points()
+    share = (0.5 + (y / SIDE - 0.5) * steepness).clip(0.0, 1.0)
+    return np.stack([np.interp(share, (0.0, stop, 1.0), channel) for channel in THREE.T], axis=2)
+
+
+def three_rings():
+    """The same around a point."""
+    across, down = points()
+    share = np.hypot(across - 40.0, down - 30.0) / 64
+    return np.stack([np.interp(share, (0.0, 0.4, 1.0), channel) for channel in THREE.T], axis=2)
 
 
 def view_of(pixels):

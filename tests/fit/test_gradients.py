@@ -52,6 +52,41 @@ def test_a_ball_is_a_circle_with_a_radial_gradient(drawn):
     assert quality(found.scene, picture).psnr >= 44
 
 
+THREE = '<stop stop-color="#fdc468"/><stop offset=".45" stop-color="#df4996"/><stop offset="1" stop-color="#5b51d8"/>'
+
+
+@pytest.mark.parametrize(
+    ("gradient", "shape", "told"),
+    [
+        (
+            'linearGradient id="g" x1="0" y1="1" x2="1" y2="0"',
+            '<rect x="14" y="20" width="100" height="90"',
+            "box",
+        ),
+        ('radialGradient id="g" cx=".4" cy=".35" r=".7"', '<circle cx="64" cy="64" r="50"', "circle"),
+    ],
+    ids=["linear3", "radial3"],
+)
+def test_a_shape_of_three_colours_is_one(gradient, shape, told, drawn, request):
+    name = gradient.split()[0]
+    picture = drawn(f'<{gradient}>{THREE}</{name}>{WHITE}{shape} fill="url(#g)"/>', SIDE, SIDE)
+    found = fitted(picture)
+    (layer,) = found.scene.layers
+    assert [(part.kind, part.paint) for part in layer.shapes] == [(told, request.node.callspec.id)]
+    assert quality(found.scene, picture).psnr >= 44
+
+
+def test_a_steep_ground_of_four_colours_is_no_photograph(drawn):
+    """Nowhere two pixels beside each other are of one colour."""
+    stops = zip((0, 33, 66, 100), ("#009fff", "#ec2f4b", "#ffe259", "#11998e"), strict=True)
+    told = "".join(f'<stop offset="{share}%" stop-color="{color}"/>' for share, color in stops)
+    cross = '<path d="M30 52h70v12h-29v40h-12v-40h-29z" fill="#fff"/>'
+    picture = drawn(f'<linearGradient id="g">{told}</linearGradient>{GROUND}{cross}', SIDE, SIDE)
+    found = fitted(picture)
+    assert found.scene.shape_count <= 5
+    assert quality(found.scene, picture).psnr >= 40
+
+
 @pytest.mark.parametrize("shapes", ["auto", 3, 6])
 def test_the_gradient_of_a_ground_counts_as_a_shape(shapes, shaded):
     picture = shaded(GROUND + DISCS)

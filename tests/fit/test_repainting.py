@@ -11,7 +11,23 @@ import torch
 from sdf2vec.fit.repainting import ground_shade, repainted
 from sdf2vec.render import reference
 from sdf2vec.scene import Joint, Layer, Scene, Shape
-from tests.fit.drawn import HALF, RED, RISE, SIDE, WHITE, box, disc, painted, points, ramp, rings, shading_of
+from tests.fit.drawn import (
+    HALF,
+    RED,
+    RISE,
+    SIDE,
+    THREE,
+    WHITE,
+    bent,
+    box,
+    disc,
+    painted,
+    points,
+    ramp,
+    rings,
+    shading_of,
+    three_rings,
+)
 
 WHERE: dict[str, Any] = {"center": ((50 - 48) / SIDE, (44 - 48) / SIDE)}  # that disc in scene units
 BOX: dict[str, Any] = {"half_size": (30 / SIDE, 20 / SIDE), "corner_radius": 0.0, "angle": 0.4}
@@ -40,7 +56,9 @@ def down_and_across():
 
 
 @pytest.mark.parametrize(
-    ("colors", "paint"), [(down_and_across, "linear"), (rings, "radial")], ids=["linear", "radial"]
+    ("colors", "paint"),
+    [(down_and_across, "linear"), (rings, "radial"), (bent, "linear3"), (three_rings, "radial3")],
+    ids=["linear", "radial", "bent", "three rings"],
 )
 @pytest.mark.parametrize(
     ("mask", "kind", "numbers"),
@@ -71,6 +89,14 @@ def test_a_small_shape_gets_the_colour_of_the_ring_there():
     assert layer.shapes[0].paint == "flat"
     away = np.hypot(68 - 40, 48 - 30) / 60
     assert layer.shapes[0].color == pytest.approx(HALF + (away - 0.5) * RISE, abs=0.008)
+
+
+def test_a_small_shape_gets_the_colour_of_three_that_is_there():
+    shading = shading_of(painted((disc(50, 44, 30), bent(), 1.0)))
+    dot = Shape.of("circle", middle_color(shading), center=(0.0, 0.2), radius=0.5 / SIDE)
+    (layer,) = repainted(Scene(SIDE, SIDE, (Layer((dot,)),), (1, 1, 1)), shading, None).layers
+    assert layer.shapes[0].paint == "flat"
+    assert layer.shapes[0].color == pytest.approx(THREE[1] + 0.5 * (THREE[2] - THREE[1]), abs=0.01)
 
 
 @pytest.mark.parametrize(

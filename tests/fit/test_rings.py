@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from sdf2vec.fit.color_stops import MIDDLES
 from sdf2vec.fit.rings import rings_of
 from tests.fit.drawn import HALF, RISE
 
@@ -65,3 +66,18 @@ def test_a_few_pixels_tell_none():
     inside = np.zeros(pixels.shape[:2], bool)
     inside[:10, :10] = True
     assert rings_of(inside, pixels) is None
+
+
+def test_of_three_colours():
+    y, x = np.mgrid[:80, :120] + 0.5
+    away = np.hypot(x - 50, y - 30)
+    colors = np.array([[1.0, 0.9, 0.8], [0.4, 0.7, 1.0], [0.1, 0.2, 0.4]])
+    levels = np.stack([np.interp(away, (0, 35, 80), channel) for channel in colors.T], axis=2)
+    pixels = (np.rint(levels * 255) / 255).astype(np.float32)
+    rings = rings_of(everywhere(pixels), pixels, MIDDLES)
+    assert rings is not None
+    assert rings.place * (120, 80) == pytest.approx([50.0, 30.0], abs=0.5)
+    assert rings.stops.values[1] * 80 == pytest.approx(35.0, abs=0.5)
+    assert np.abs(shown(rings, pixels) - pixels).max() < 0.008
+    two = rings_of(everywhere(pixels), pixels)
+    assert two is None or np.abs(shown(two, pixels) - pixels).max() > 0.05

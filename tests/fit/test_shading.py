@@ -6,10 +6,26 @@ import numpy as np
 import pytest
 
 from sdf2vec.bench.known_scenes import known_scene
+from sdf2vec.fit.bends import BentShade
 from sdf2vec.fit.rings import RadialShade
 from sdf2vec.fit.shades import Shade
 from sdf2vec.fit.shading import Shading
-from tests.fit.drawn import GREEN, HALF, RISE, SIDE, WHITE, box, disc, painted, ramp, rings, shading_of
+from tests.fit.drawn import (
+    GREEN,
+    HALF,
+    RISE,
+    SIDE,
+    THREE,
+    WHITE,
+    bent,
+    box,
+    disc,
+    painted,
+    ramp,
+    rings,
+    shading_of,
+    three_rings,
+)
 
 
 def flattened(pixels):
@@ -34,6 +50,54 @@ def test_so_does_one_with_a_radial_gradient():
     assert shade.place * SIDE == pytest.approx([40.0, 30.0], abs=0.5)
     color = shading.flattened.pixels[44, 50]
     assert np.abs(shading.flattened.pixels - painted((mask, color, 1.0))).max() < 0.02
+
+
+@pytest.mark.parametrize(
+    ("colors", "told"),
+    [(bent, BentShade), (three_rings, RadialShade)],
+    ids=["along a line", "around a point"],
+)
+def test_so_does_one_of_three_colours(colors, told):
+    mask = disc(50, 44, 30)
+    shading = shading_of(painted((mask, colors(), 1.0)))
+    (number,) = shading.graded
+    shade = shading.shades[number - 1]
+    assert isinstance(shade, told)
+    np.testing.assert_allclose(shade.stops.colors[1], THREE[1], atol=0.02)
+    color = shading.flattened.pixels[44, 50]
+    assert np.abs(shading.flattened.pixels - painted((mask, color, 1.0))).max() < 0.03  # at its ends
+
+
+def test_a_gradient_that_bends_sharply_is_one_region():
+    """So much that the picture is not even there."""
+    ring = disc(48, 48, 44) & ~disc(48, 48, 28)
+    shading = shading_of(painted((ring, bent(0.5), 1.0)))
+    assert len(shading.graded) == 1
+    flat = shading.flattened.pixels
+    assert np.abs(flat - painted((ring, flat[48, 12], 1.0))).max() < 0.03
+
+
+def test_two_gradients_that_meet_get_no_third_colour_there():
+    """As one of five colours does."""
+    x = np.minimum((np.arange(4 * SIDE) + 0.5) / SIDE, 3.999)
+    colors = np.array([[0.9, 0.1, 0.1], [0.9, 0.9, 0.1], [0.1, 0.7, 0.1], [0.1, 0.7, 0.9], [0.3, 0.1, 0.9]])
+    row = np.stack([np.interp(x, np.arange(5), channel) for channel in colors.T], axis=1)
+    shading = shading_of(np.rint(np.broadcast_to(row, (SIDE, *row.shape)) * 255) / 255)
+    assert len(shading.graded) == 2
+    flat = shading.flattened.pixels
+    far = np.linalg.norm(flat[:, :, None] - shading.flats[[number - 1 for number in shading.graded]], axis=3)
+    between = far.min(axis=2) > 0.02
+    assert between.mean() < 0.02
+    ends = np.linalg.norm(np.diff(shading.flats[[number - 1 for number in shading.graded]], axis=0))
+    assert far[between].sum(axis=1) == pytest.approx(ends, abs=0.05)
+
+
+def test_too_small_a_share_of_the_picture_is_none():
+    pixels = painted((box(10, 10, 60, 60), ramp(), 1.0)).astype(np.float32)
+    pixels[:, 64:] = np.random.default_rng(1).random((SIDE, SIDE - 64, 3))
+    assert Shading.of(pixels) is not None
+    assert Shading.of(pixels, 0.5) is not None
+    assert Shading.of(pixels, 0.7) is None
 
 
 def test_a_plane_is_no_radial_gradient():

@@ -80,6 +80,37 @@ def test_a_shifted_radial_paint_begins_elsewhere(shift, radius, stops):
     assert rings.stops == stops
 
 
+GREEN = (0.0, 1.0, 0.0)
+THREE: dict[str, Any] = {"color_middle": GREEN, "color_end": BLUE, "stop": 0.25}
+
+
+def test_a_paint_of_three_colours_has_three_stops():
+    shape = Shape.of("circle", RED, paint="linear3", direction=(0.5, 0), shift=0.0, **THREE, **PLACE)
+    ramp = gradient_of(shape, CANVAS)
+    assert isinstance(ramp, LinearGradient)
+    assert ramp.start == pytest.approx((100.0, 100.0))
+    assert ramp.end == pytest.approx((200.0, 100.0))
+    assert ramp.stops == (Stop(0.0, RED), Stop(0.25, GREEN), Stop(1.0, BLUE))
+
+
+@pytest.mark.parametrize(
+    ("shift", "radius", "stops"),
+    [
+        (0.0, 50.0, (Stop(0.0, RED), Stop(0.25, GREEN), Stop(1.0, BLUE))),
+        (-1.0, 100.0, (Stop(0.5, RED), Stop(0.625, GREEN), Stop(1.0, BLUE))),
+        (0.125, 43.75, (Stop(0.0, (0.5, 0.5, 0.0)), Stop(1 / 7, GREEN), Stop(1.0, BLUE))),
+        (0.625, 18.75, (Stop(0.0, (0.0, 0.5, 0.5)), Stop(1.0, BLUE))),  # it begins beyond the second
+    ],
+)
+def test_a_radial_paint_of_three_colours_has_those_that_are_seen(shift, radius, stops):
+    values: dict[str, Any] = {"focus": (0, 0), "steepness": (1, 1), "shift": shift}
+    rings = gradient_of(Shape.of("circle", RED, paint="radial3", **values, **THREE, **PLACE), CANVAS)
+    assert isinstance(rings, RadialGradient)
+    assert rings.radii == pytest.approx((radius, radius))
+    assert [stop.offset for stop in rings.stops] == pytest.approx([stop.offset for stop in stops])
+    assert [stop.color for stop in rings.stops] == [stop.color for stop in stops]
+
+
 @pytest.mark.parametrize(("steepness", "shift", "color"), [(1.0, 1.5, BLUE), (0.0, 0.25, (0.75, 0.0, 0.25))])
 def test_a_radial_paint_of_one_colour_is_that_colour(steepness, shift, color):
     values: dict[str, Any] = {"paint": "radial", "color_end": BLUE, "focus": (0, 0), "shift": shift}

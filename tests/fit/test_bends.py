@@ -1,0 +1,69 @@
+"""Linear gradients of three colours told from pictures, which are drawn in numpy by their formula."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from sdf2vec.fit.bends import bend_of
+
+COLORS = np.array([[0.9, 0.7, 0.3], [0.8, 0.2, 0.5], [0.3, 0.3, 0.8]])
+SIZE = 80, 120
+
+
+def picture(angle, stops=(10.0, 60.0, 110.0), size=SIZE):
+    """Pixels [H, W, 3] in 8 bits whose colours change along a direction, at so many pixels from the corner."""
+    y, x = np.mgrid[: size[0], : size[1]] + 0.5
+    along = x * np.cos(angle) + y * np.sin(angle)
+    shown = np.stack([np.interp(along, stops, channel) for channel in COLORS.T], axis=2)
+    return (np.rint(shown * 255) / 255).astype(np.float32)
+
+
+def everywhere(pixels):
+    return np.ones(pixels.shape[:2], bool)
+
+
+def shown(bend, pixels):
+    height, width = pixels.shape[:2]
+    x, y = (np.arange(width) + 0.5) / width, (np.arange(height) + 0.5) / height
+    return bend.at(x.astype(np.float32)[None], y.astype(np.float32)[:, None])
+
+
+@pytest.mark.parametrize("angle", [0.0, 0.5, 1.2])
+@pytest.mark.parametrize("stop", [35.0, 60.0, 90.0])
+def test_its_direction_its_stops_and_its_colours(angle, stop):
+    pixels = picture(angle, (10.0, stop, 110.0))
+    bend = bend_of(everywhere(pixels), pixels)
+    assert bend is not None
+    across, down = bend.direction / (120, 80)  # for each pixel
+    length = np.hypot(across, down)
+    turn = np.arctan2(down, across) - angle
+    assert np.sin(turn) == pytest.approx(0.0, abs=0.01)
+    where = (bend.stops.values if np.cos(turn) > 0 else -bend.stops.values[::-1]) / length
+    assert where[1] == pytest.approx(stop, abs=1.0)
+    assert np.abs(shown(bend, pixels) - pixels).max() < 0.008
+
+
+def test_of_a_part_of_a_picture():
+    """What is outside has no part in it, and nothing is known of what is beyond."""
+    pixels = picture(0.0)
+    inside = everywhere(pixels)
+    inside[:, :30] = inside[:12] = False
+    elsewhere = np.where(inside[..., None], pixels, np.float32(0.5))
+    bend = bend_of(inside, elsewhere)
+    assert bend is not None
+    assert np.abs(shown(bend, pixels) - pixels)[inside].max() < 0.008
+    assert np.abs(shown(bend, pixels)[:, :29] - pixels[:, 30:31]).max() < 0.02
+
+
+def test_what_ends_softly_is_none():
+    """Most of it is of one colour."""
+    pixels = picture(0.3, (-9.0, -6.0, 16.0))
+    assert bend_of(everywhere(pixels), pixels) is None
+
+
+def test_a_few_pixels_tell_none():
+    pixels = picture(0.0)
+    inside = np.zeros(pixels.shape[:2], bool)
+    inside[:10, :10] = True
+    assert bend_of(inside, pixels) is None
