@@ -18,6 +18,7 @@ MIDDLES: Sequence[tuple[float, ...]] = (0.3,), (0.5,), (0.7,)
 NO_MIDDLE: Sequence[tuple[float, ...]] = ((),)
 SCALE = 0.1  # of the way, of the search
 TINY = 1e-6
+SAME = 2.0 / 255  # how far two colours are from each other at most that are one
 CHANGES = 6.0 / 255  # of a colour from one stop to the next, at least, where there is a gradient
 
 Measure = Callable[[Float64Array], Float64Array]
@@ -54,9 +55,14 @@ class ColorStops(NamedTuple):
         return ColorStops(self.values[chosen], self.colors[chosen])
 
     def within(self, low: float, high: float) -> ColorStops:
-        """The same between two values, beyond which nothing is known."""
+        """The same between two values, beyond which nothing is known, without what is of one colour before and after
+        all others.
+        """
         values = self.values.clip(low, high)
-        return ColorStops(values, self.at(values))
+        colors = self.at(values)
+        changes = np.flatnonzero(np.abs(np.diff(colors, axis=0)).max(axis=1) >= SAME)
+        first, last = (changes[0], changes[-1] + 2) if len(changes) else (0, 2)
+        return ColorStops(values, colors).some(slice(first, last))
 
     def begun(self, value: float) -> ColorStops:
         """The same from another value on."""

@@ -26,6 +26,7 @@ from .windows import Part, Sides, extent, larger, widened
 WHITE = 255  # levels
 LOOKED = 320  # pixels squared, at which regions are looked for
 REACH = 3  # pixels beyond a region that its edge may show in
+BEYOND = 5  # pixels from it where there is another one, if its edge is sharp: it may have a thin rim
 AROUND = 5  # pixels squared where an edge goes from one colour to the other
 # length of the difference of two colours that are one, in a region at its edge, and where it may be no plane
 NOISE, BENT_AWAY = 3.0 / 255, 16.0 / 255
@@ -180,7 +181,7 @@ def _share(apart: Float32Array, near: BoolArray) -> Float32Array:
 def _is_sharp(labels: IntArray, number: int, calm: BoolArray) -> bool:
     """Whether other regions begin where a region ends, or it goes on; or, beyond an edge, what is calm [H, W]."""
     inside, square = labels == number, np.ones((3, 3))
-    within = ndimage.binary_dilation(inside, square, iterations=REACH)
+    within = ndimage.binary_dilation(inside, square, iterations=BEYOND)
     beyond = ndimage.binary_dilation(within, square) & ~within
     if not beyond.any():
         return True

@@ -24,6 +24,14 @@ def test_what_is_beyond_some_values_is_cut_off():
     np.testing.assert_allclose(cut.colors, STOPS.at(cut.values))
 
 
+def test_what_is_of_one_colour_at_the_ends_needs_no_stop():
+    first, middle, _ = COLORS
+    longer = ColorStops(np.arange(5.0), np.array([first, first + 1 / 255, middle, middle, middle]))
+    cut = longer.within(0.0, 9.0)
+    assert cut.values.tolist() == [1.0, 2.0]
+    np.testing.assert_allclose(cut.colors, longer.colors[1:3])
+
+
 def test_a_gradient_may_begin_before_its_first_stop():
     first, middle, last = COLORS
     longer = STOPS.begun(0.5)
