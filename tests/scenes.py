@@ -125,10 +125,10 @@ FAMILIES: dict[str, list[Structure]] = {
     "plain": [(Part("circle"),), (Part("box"),), (Part("arc"),), (Part("rounded_triangle"),)],
     "union": [(Part("circle"), Part("triangle", "linear", "union")), (Part("ellipse", "linear"),)],
     "cut": [
-        (Part("box", "linear"), Part("circle", join="subtraction"), Part("ellipse", join="intersection")),
-        (Part("displaced", "linear3"),),
+        (Part("box", "linear3"), Part("circle", join="subtraction"), Part("ellipse", join="intersection")),
+        (Part("displaced"),),
     ],
-    "patches": [(Part("gaussian", "radial"),), (Part("gabor", "radial3"),)],
+    "patches": [(Part("gaussian", "radial"),), (Part("gabor"),), (Part("gaussian", "radial3"),)],
 }
 
 

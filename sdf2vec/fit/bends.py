@@ -12,9 +12,10 @@ from scipy.optimize import minimize_scalar
 
 from ..arrays import BoolArray, Float32Array, Float64Array, IntArray
 from .color_stops import MIDDLES, ColorStops, nearest_stops
-from .rings import LEAST, LOOKED, MOSTLY, SMOOTH, smooth_slopes
+from .rings import LEAST, LOOKED, SMOOTH, smooth_slopes
 
 SCALES = (0.1,)  # of the search: radians
+MOSTLY = 0.3  # of the pixels lie where colours change, at least: else it is one colour that ends softly
 MANY, MOST = 800, 8  # pixels of a region of many colours, at least; so many colours
 TURN, FINE = (
     0.1,

@@ -30,8 +30,7 @@ LOOKED = 128  # pixels squared, at which is told which regions are seen of a lay
 NEAR = 0.1  # how far a channel of its colour may be from that of the region
 OPAQUE = 0.9  # at least
 UNSEEN = 3.0 / 255  # change of a colour from a shape's middle to its edge that is not worth a gradient
-LEAST = 0.5  # share of that way on which it changes, at least: there may be no such colours farther on
-TINY = 1e-6
+OVER = 1.0 / 255  # beyond what a channel may be, by which it may seem to be there
 RADIAL = "radial"
 GRID = np.stack(np.meshgrid((-1.0, 0.0, 1.0), (-1.0, 0.0, 1.0)), axis=-1).reshape(-1, 2)  # of a shape's frame
 
@@ -114,15 +113,27 @@ def _graded(shape: Shape, shade: Gradient, size: tuple[float, float]) -> Shape:
     slopes = shade.slopes[:, :3] / np.array(size)[:, None]
     axes, strengths, changes = np.linalg.svd(back.T @ slopes, full_matrices=False)
     axis, change = axes[:, 0], strengths[0] * changes[0]
-    color = (shade.color[:3] + (back @ -middle - place) @ slopes).clip(0.0, 1.0)
-    room = float((np.minimum(color, 1.0 - color) / np.maximum(np.abs(change), TINY)).min())
+    color = shade.color[:3] + (back @ -middle - place) @ slopes
     extent = float(np.abs(axis).sum())
-    if extent * np.abs(change).max() <= UNSEEN:
-        return replace(shape, color=tuple(color.tolist()))
-    reach = min(max(room, LEAST * extent), extent)
-    ends = ((color + way * reach * change).clip(0.0, 1.0) for way in (-1, 1))
-    first, last, direction = (tuple(values.tolist()) for values in (*ends, axis / (2 * reach)))
-    return Shape.of(shape.kind, first, PAINT, **shape.named(), color_end=last, direction=direction)
+    changes = extent * np.abs(change) > UNSEEN
+    if not changes.any():
+        return replace(shape, color=tuple(color.clip(0.0, 1.0).tolist()))
+    low, high = _colorful(color[changes], change[changes], extent)
+    ends = ((color + end * change).clip(0.0, 1.0) for end in (low, high))
+    first, last, direction = (tuple(values.tolist()) for values in (*ends, axis / (high - low)))
+    shift = -low / (high - low) - 0.5
+    return Shape.of(
+        shape.kind, first, PAINT, **shape.named(), color_end=last, direction=direction, shift=shift
+    )
+
+
+def _colorful(color: Float64Array, change: Float64Array, extent: float) -> tuple[float, float]:
+    """From where on and up to where a line of colours, which has one [C] at 0 and goes as far as an extent both ways,
+    has none that there is not.
+    """
+    ends = np.sort((np.array([[-OVER], [1.0 + OVER]]) - color) / change, axis=0)
+    low, high = max(float(ends[0].max()), -extent), min(float(ends[1].min()), extent)
+    return (low, high) if high > low else (-extent, extent)
 
 
 def _ringed(shape: Shape, rings: RadialShade, middle: Float64Array, back: Float64Array) -> Shape:

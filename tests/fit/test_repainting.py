@@ -91,6 +91,17 @@ def test_a_small_shape_gets_the_colour_of_the_ring_there():
     assert layer.shapes[0].color == pytest.approx(HALF + (away - 0.5) * RISE, abs=0.008)
 
 
+def test_a_channel_that_hardly_changes_does_not_end_a_gradient():
+    """Pure red runs to yellow: the red would be more than there is, by less than one level."""
+    rise = np.array([0.003, 0.8, 0.0])
+    pixels = painted((box(8, 20, 88, 76), ramp(rise) + np.array([0.5, 0.1, -0.5]), 1.0))
+    shading = shading_of(pixels)
+    place: dict[str, Any] = {"center": (0.0, 0.0), "half_size": (40 / SIDE, 28 / SIDE)}
+    shape = Shape.of("box", middle_color(shading, 48, 48), **place, angle=0.0, corner_radius=0.0)
+    made = repainted(Scene(SIDE, SIDE, (Layer((shape,)),), (1, 1, 1)), shading, None)
+    assert np.abs(shown(made) - pixels)[24:72, 12:84].max() < 0.01
+
+
 def test_a_small_shape_gets_the_colour_of_three_that_is_there():
     shading = shading_of(painted((disc(50, 44, 30), bent(), 1.0)))
     dot = Shape.of("circle", middle_color(shading), center=(0.0, 0.2), radius=0.5 / SIDE)
