@@ -22,7 +22,10 @@ LEAST_SMOOTHNESS = 1e-3  # scene units: of a join that is smooth at all
 HIGHEST_FREQUENCY = 60.0  # radians per scene unit
 STEEPEST = 10.0  # of a gradient: ranges of colour across half a shape
 FARTHEST = 6.0  # of those by which its middle is off that of the shape
-NEAREST_STOP = 0.02  # shares of a gradient, of its middle colour to one at an end
+FIRST_STOP = (
+    0.01  # share of a gradient from its first colour to its middle one, at least, and from there to its last
+)
+NEAREST_STOP = 0.02  # the same where a fit may move it
 FAINTEST = 0.02  # opacity where colours are not signed: below it a shape would stop learning
 GRAIN = 0.001  # scene units: falloffs much below it are packed in equal steps
 GEOMETRY_DECIMALS = 6
@@ -382,8 +385,8 @@ RISE = Unit(  # of a gradient to all sides
 )
 STOP = Unit(  # where a gradient has its middle colour
     "stop",
-    NEAREST_STOP,
-    1.0 - NEAREST_STOP,
+    FIRST_STOP,
+    1.0 - FIRST_STOP,
     0.02,
     _always_within(NEAREST_STOP, 1.0 - NEAREST_STOP),
     Codec(_between("stop")),

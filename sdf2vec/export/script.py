@@ -79,7 +79,8 @@ def _told(parameter: Parameter) -> dict[str, object]:
 def _needed(parameter: Parameter) -> dict[str, object]:
     """What it must know to read the numbers of a compact file."""
     unit = parameter.unit
-    told = {"unit": unit.name, "width": parameter.width, "low": int(unit.low), "high": int(unit.high)}
+    low, high = (int(end) if end.is_integer() else end for end in (unit.low, unit.high))
+    told = {"unit": unit.name, "width": parameter.width, "low": low, "high": high}
     since = {"since": parameter.since} if parameter.since > 1 else {}
     return told | since | ({"positive": True} if parameter.positive else {})
 

@@ -300,13 +300,13 @@ def test_a_flip_is_met_by_the_shapes_of_a_drawing(drawn):
 
 
 def test_a_target_that_gradients_do_not_reach_is_gone_on_for():
-    """A box whose colour rises and bends: by two colours it is told to no more than some dB."""
+    """A box whose colour rises and bends: by three colours it is told to no more than some dB."""
     x, y = (np.arange(side, dtype=np.float32) / side - 0.5 for side in (96, 72))
     shade = np.array([0.5, 0.5, 0.5]) + x[:, None] * (0.5, 0.3, -0.5) + (x[:, None] ** 2) * (0, -0.2, 0)
     inside = (np.abs(x)[None] < 0.3) & (np.abs(y)[:, None] < 0.3)
     picture = Picture(np.where(inside[..., None], shade[None], 1.0).astype(np.float32))
     without = fitted(picture)
-    assert [layer.shapes[0].paint for layer in without.scene.layers] == ["linear"]
+    assert [layer.shapes[0].paint for layer in without.scene.layers] == ["linear3"]
     psnr = quality(without.scene, picture).psnr
     found = fitted(picture, target_psnr=psnr + 1, max_shapes=32, preset="fast")
     assert found.met
