@@ -4,47 +4,29 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from typing import NamedTuple
 
 import numpy as np
 from scipy import ndimage
 from scipy.optimize import minimize_scalar
 
-from ..arrays import BoolArray, Float32Array, Float64Array, IntArray
-from .color_stops import MIDDLES, ColorStops, nearest_stops
-from .rings import LEAST, LOOKED, SMOOTH, smooth_slopes
+from ..arrays import BoolArray, Float32Array, Float64Array
+from .color_stops import MIDDLES, Samples, StoppedShade, nearest_stops
+from .rings import LEAST, SMOOTH, smooth_slopes
 
 SCALES = (0.1,)  # of the search: radians
 MOSTLY = 0.3  # of the pixels lie where colours change, at least: else it is one colour that ends softly
 MANY, MOST = 800, 8  # pixels of a region of many colours, at least; so many colours
-TURN, FINE = (
-    0.1,
-    1e-4,
-)  # radians: how far a direction may be from where colours change most, and how exact it is
+TURN = 0.1  # radians: how far a direction may be from where colours change most
+FINE = 1e-4  # radians: how exact it is
 BINS = 64  # places along a direction
 PLANE, NEARLY = 2.2 / 255, 0.98  # how far a region is from a gradient at most; share of it that is as near
 
 
-class BentShade(NamedTuple):
-    """Premultiplied colours by how far a place is along a direction [2], by shares of the sides."""
+@dataclass(frozen=True, eq=False)
+class BentShade(StoppedShade):
+    """Colours by how far a place is along a direction [2], by shares of the sides."""
 
     direction: Float64Array
-    stops: ColorStops
-
-    @property
-    def is_flat(self) -> bool:
-        """Never: it is no single colour."""
-        return False
-
-    @property
-    def color(self) -> Float32Array:
-        """One that it has [C]."""
-        return self.stops.middle
-
-    @property
-    def axis(self) -> Float32Array:
-        """The direction [C] in which its colours lie."""
-        return self.stops.axis
 
     def at(self, x: Float32Array, y: Float32Array) -> Float32Array:
         """The colour there [..., C]."""
@@ -62,7 +44,7 @@ def bend_of(inside: BoolArray, pixels: Float32Array) -> BentShade | None:
     """
     if inside.sum() < LEAST:
         return None
-    line = _Line.of(inside, pixels)
+    line = Line.of(inside, pixels)
     return line.nearest(_steepest(inside, line.colors), MIDDLES)
 
 
@@ -70,7 +52,7 @@ def long_bends_of(inside: BoolArray, pixels: Float32Array) -> Iterator[BentShade
     """The same of ever more colours; none where colours do not hang on how far they are along a line."""
     if inside.sum() < MANY:
         return
-    line = _Line.of(inside, pixels)
+    line = Line.of(inside, pixels)
     angle = line.evenest(float(_steepest(inside, line.colors)[0]))
     middles = line.bends(angle)
     for count in range(2, len(middles) + 1):
@@ -79,25 +61,8 @@ def long_bends_of(inside: BoolArray, pixels: Float32Array) -> Iterator[BentShade
             yield bend
 
 
-@dataclass(frozen=True, eq=False)
-class _Line:
-    """Places x, y [P] in shorter sides of a picture of so many rows and columns, the colours [P, C] there, and which of
-    them are looked at.
-    """
-
-    x: Float64Array
-    y: Float64Array
-    colors: Float32Array
-    some: IntArray
-    sides: tuple[int, int]
-
-    @classmethod
-    def of(cls, inside: BoolArray, pixels: Float32Array) -> _Line:
-        rows, columns = np.nonzero(inside)
-        height, width = inside.shape
-        unit = min(height, width)
-        some = np.linspace(0, len(rows) - 1, min(len(rows), LOOKED)).astype(int)
-        return cls((columns + 0.5) / unit, (rows + 0.5) / unit, pixels[inside], some, (height, width))
+class Line(Samples):
+    """What colours hang on how far they are along a line."""
 
     def along(self, angle: float) -> Float64Array:
         """How far those that are looked at are along a direction."""
@@ -113,9 +78,7 @@ class _Line:
         stops = stops.within(float(along.min()), float(along.max()))
         if stops.changing(along) < MOSTLY:
             return None
-        height, width = self.sides
-        direction = np.array((np.cos(angle) * width, np.sin(angle) * height)) / min(self.sides)
-        return BentShade(direction, stops)
+        return BentShade(stops, np.array((np.cos(angle), np.sin(angle))) * self.sides)
 
     def evenest(self, angle: float) -> float:
         """The angle near to one, across which colours differ least."""

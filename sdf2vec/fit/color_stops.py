@@ -3,14 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from typing import NamedTuple
+from dataclasses import dataclass
+from typing import NamedTuple, Self
 
 import numpy as np
 from scipy.optimize import least_squares
 
-from ..arrays import Float32Array, Float64Array
+from ..arrays import BoolArray, Float32Array, Float64Array, IntArray
+from .windows import Sides
 
 MOST_STEPS, NEARER = 60, 1e-4  # of the search; shares by which the error falls in one, at least
+LOOKED = 3000  # pixels that are looked at
 NEAREST = 0.05  # shares of the way, of two stops
 FIRST = 0.02, 0.98  # where the stops at the ends start, shares of the pixels
 # where one between them may start, shares of the way; where there is none
@@ -71,6 +74,60 @@ class ColorStops(NamedTuple):
         return ColorStops(
             np.array([value, *self.values[1:]]), np.array([color, *self.colors[1:]], np.float32)
         )
+
+
+@dataclass(frozen=True, eq=False)
+class StoppedShade:
+    """A gradient of a picture that hangs on one number at each place: by premultiplied colours at stops."""
+
+    stops: ColorStops
+
+    @property
+    def is_flat(self) -> bool:
+        """Never: it is no single colour."""
+        return False
+
+    @property
+    def color(self) -> Float32Array:
+        """One that it has [C]."""
+        return self.stops.middle
+
+    @property
+    def axis(self) -> Float32Array:
+        """The direction [C] in which its colours lie."""
+        return self.stops.axis
+
+
+@dataclass(frozen=True, eq=False)
+class Samples:
+    """Places x, y [P] in shorter sides of a picture of so many rows and columns, the colours [P, C] there, and which of
+    them are looked at.
+    """
+
+    x: Float64Array
+    y: Float64Array
+    colors: Float32Array
+    some: IntArray
+    size: Sides
+
+    @classmethod
+    def of(cls, inside: BoolArray, pixels: Float32Array) -> Self:
+        """What is inside [H, W] of a picture [H, W, C]."""
+        rows, columns = np.nonzero(inside)
+        unit = min(inside.shape)
+        some = np.linspace(0, len(rows) - 1, min(len(rows), LOOKED)).astype(int)
+        return cls((columns + 0.5) / unit, (rows + 0.5) / unit, pixels[inside], some, inside.shape[:2])
+
+    @property
+    def unit(self) -> int:
+        """The shorter side of the picture in pixels."""
+        return min(self.size)
+
+    @property
+    def sides(self) -> tuple[float, float]:
+        """Its width and height in shorter sides."""
+        height, width = self.size
+        return width / self.unit, height / self.unit
 
 
 def main_axis(colors: Float32Array) -> Float32Array:

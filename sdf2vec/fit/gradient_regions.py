@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import replace
 from itertools import chain
 from typing import NamedTuple
 
@@ -76,7 +77,7 @@ def _parts(region: Region) -> Iterator[Region]:
         own = slice(first, first + COLORS)
         low = -np.inf if first == 0 else values[first]
         high = np.inf if first + COLORS >= len(values) else values[first + COLORS - 1]
-        yield Region((along >= low) & (along < high), shade._replace(stops=shade.stops.some(own)))
+        yield Region((along >= low) & (along < high), replace(shade, stops=shade.stops.some(own)))
 
 
 def _over_knees(found: list[Region], pixels: Float32Array) -> list[Region]:

@@ -3,16 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import NamedTuple
+from dataclasses import dataclass
 
 import numpy as np
 from scipy import ndimage
 
 from ..arrays import BoolArray, Float32Array, Float64Array
-from .color_stops import NO_MIDDLE, ColorStops, main_axis, nearest_stops
+from .color_stops import NO_MIDDLE, Samples, StoppedShade, main_axis, nearest_stops
 
 LEAST = 200  # pixels of a region: fewer are like a gradient of some kind by chance
-LOOKED = 3000  # pixels that are looked at
 SMOOTH = 2.0  # pixels, of the standard deviation of a blur that takes away the steps of eight bits
 STEEP = 0.3  # share of the largest slopes, of those that point to the middle
 ROUND = 8.0  # times the one axis of an ellipse, that the other may be
@@ -22,30 +21,15 @@ TIP = 5.0  # pixels: what is too near to the middle of rings to be smooth
 SCALES, TINY = (0.1, 0.1, 0.3), 1e-3  # of the search: of its numbers; of weights
 
 
-class RadialShade(NamedTuple):
-    """Premultiplied colours by the distance from a place (x, y), by shares of the sides: in shares of the shorter side,
-    of which that along y counts `squeeze` times. `sides`: width and height, in the same unit.
+@dataclass(frozen=True, eq=False)
+class RadialShade(StoppedShade):
+    """Colours by the distance from a place (x, y), by shares of the sides: in shares of the shorter side, of which that
+    along y counts `squeeze` times. `sides`: width and height, in the same unit.
     """
 
     place: Float32Array
     squeeze: float
-    stops: ColorStops
     sides: tuple[float, float]
-
-    @property
-    def is_flat(self) -> bool:
-        """Never: it is no single colour."""
-        return False
-
-    @property
-    def color(self) -> Float32Array:
-        """One that it has [C]."""
-        return self.stops.middle
-
-    @property
-    def axis(self) -> Float32Array:
-        """The direction [C] in which its colours lie."""
-        return self.stops.axis
 
     def at(self, x: Float32Array, y: Float32Array) -> Float32Array:
         """The colour there [..., C]."""
@@ -64,26 +48,22 @@ def rings_of(
     """
     if inside.sum() < LEAST:
         return None
-    height, width = inside.shape
-    unit = min(height, width)
-    rows, columns = np.nonzero(inside)
-    colors = pixels[inside]
-    x, y = (columns + 0.5) / unit, (rows + 0.5) / unit
-    start = _middle(inside, (colors - colors.mean(axis=0)) @ main_axis(colors), unit)
-    some = np.linspace(0, len(x) - 1, min(len(x), LOOKED)).astype(int)
-    numbers, stops = nearest_stops(
-        lambda numbers: _distances(x[some], y[some], numbers), start, SCALES, colors[some], middles
-    )
-    if np.abs(numbers[:2] - [x.mean(), y.mean()]).max() > FARTHEST or abs(numbers[2]) > np.log(ROUND):
+    seen = Samples.of(inside, pixels)
+    start = _middle(inside, (seen.colors - seen.colors.mean(axis=0)) @ main_axis(seen.colors), seen.unit)
+    x, y, colors = seen.x[seen.some], seen.y[seen.some], seen.colors[seen.some]
+    numbers, stops = nearest_stops(lambda numbers: _distances(x, y, numbers), start, SCALES, colors, middles)
+    if np.abs(numbers[:2] - [seen.x.mean(), seen.y.mean()]).max() > FARTHEST or abs(numbers[2]) > np.log(
+        ROUND
+    ):
         return None
-    away = _distances(x, y, numbers)
+    away = _distances(seen.x, seen.y, numbers)
     stops = stops.within(float(away.min()), float(away.max()))
-    if away.min() * unit < TIP and stops.values[0] * unit < TIP:
+    if away.min() * seen.unit < TIP and stops.values[0] * seen.unit < TIP:
         stops = stops.begun(0.0)
     if stops.changing(away) < MOSTLY:
         return None
-    sides = width / unit, height / unit
-    return RadialShade(np.array(numbers[:2] / sides, np.float32), float(np.exp(numbers[2])), stops, sides)
+    place = np.array(numbers[:2] / seen.sides, np.float32)
+    return RadialShade(stops, place, float(np.exp(numbers[2])), seen.sides)
 
 
 def _middle(inside: BoolArray, share: Float64Array, unit: int) -> Float64Array:

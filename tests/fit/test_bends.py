@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from sdf2vec.fit.bends import bend_of
+from sdf2vec.fit.bends import Line, bend_of, long_bends_of
 
 COLORS = np.array([[0.9, 0.7, 0.3], [0.8, 0.2, 0.5], [0.3, 0.3, 0.8]])
 SIZE = 80, 120
@@ -54,6 +54,28 @@ def test_of_a_part_of_a_picture():
     assert bend is not None
     assert np.abs(shown(bend, pixels) - pixels)[inside].max() < 0.008
     assert np.abs(shown(bend, pixels)[:, :29] - pixels[:, 30:31]).max() < 0.02
+
+
+@pytest.mark.parametrize("off", [-0.07, 0.05])
+def test_the_direction_across_which_colours_are_even(off):
+    pixels = picture(0.5)
+    line = Line.of(everywhere(pixels), pixels)
+    assert line.evenest(0.5 + off) == pytest.approx(0.5, abs=0.003)
+
+
+def test_of_many_colours():
+    """Five, along an odd direction: with fewer it is off by much."""
+    y, x = np.mgrid[: SIZE[0], : SIZE[1]] + 0.5
+    along, stops = x * np.cos(0.4) + y * np.sin(0.4), (5.0, 30.0, 62.0, 90.0, 130.0)
+    levels = [(0.9, 0.8, 0.1, 0.2, 0.9), (0.1, 0.9, 0.7, 0.1, 0.3), (0.2, 0.1, 0.8, 0.9, 0.5)]
+    shades = np.stack([np.interp(along, stops, channel) for channel in levels], axis=2)
+    pixels = (np.rint(shades * 255) / 255).astype(np.float32)
+    off = {
+        len(bend.stops.values): np.abs(shown(bend, pixels) - pixels).max()
+        for bend in long_bends_of(everywhere(pixels), pixels)
+    }
+    assert off[5] < 0.02
+    assert off[4] > 0.1
 
 
 def test_what_ends_softly_is_none():

@@ -77,6 +77,19 @@ def test_stops_are_told_from_colours(count, stop):
     np.testing.assert_allclose(found.colors, COLORS[:count], atol=0.02)
 
 
+def test_stops_may_start_in_any_order():
+    values = np.linspace(0.0, 1.0, 400)
+    colors = np.stack([np.interp(values, (0.0, 0.3, 0.6, 1.0), (0.1, 0.9, 0.2, 0.8))] * 3, axis=1)
+    _, found = nearest_stops(
+        lambda numbers: values + 0 * numbers[0],
+        np.array([0.0]),
+        (0.1,),
+        colors.astype(np.float32),
+        ((0.65, 0.25),),
+    )
+    assert found.values[1:3] == pytest.approx([0.3, 0.6], abs=0.01)
+
+
 def test_one_colour_has_stops_of_that_colour():
     colors = np.full((50, 3), 0.25, np.float32)
     values = np.linspace(0.0, 1.0, 50)

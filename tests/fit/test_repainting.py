@@ -12,6 +12,7 @@ from sdf2vec.fit.repainting import ground_shade, repainted
 from sdf2vec.render import reference
 from sdf2vec.scene import Joint, Layer, Scene, Shape
 from tests.fit.drawn import (
+    GREEN,
     HALF,
     RED,
     RISE,
@@ -100,6 +101,23 @@ def test_a_channel_that_hardly_changes_does_not_end_a_gradient():
     shape = Shape.of("box", middle_color(shading, 48, 48), **place, angle=0.0, corner_radius=0.0)
     made = repainted(Scene(SIDE, SIDE, (Layer((shape,)),), (1, 1, 1)), shading, None)
     assert np.abs(shown(made) - pixels)[24:72, 12:84].max() < 0.01
+
+
+def test_a_gradient_ends_on_one_side_where_there_are_no_more_colours():
+    """Of a box that goes on below another one: so its middle is not that of the gradient."""
+    rise = np.array([1.2, 0.0, 0.0])
+    pixels = painted(
+        (box(8, 20, 90, 76), ramp(rise), 1.0),
+        (box(56, 10, 96, 86), GREEN, 1.0),
+        ground=np.array([0.0, 0.0, 1.0]),
+    )
+    shading = shading_of(pixels)
+    place: dict[str, Any] = {"center": (4 / SIDE, 0.0), "half_size": (44 / SIDE, 28 / SIDE)}
+    shape = Shape.of("box", middle_color(shading, 30, 48), **place, angle=0.0, corner_radius=0.0)
+    (layer,) = repainted(Scene(SIDE, SIDE, (Layer((shape,)),), (0, 0, 1)), shading, None).layers
+    assert layer.shapes[0].paint == "linear"
+    alone = shown(Scene(SIDE, SIDE, (layer,), (0, 0, 1)))
+    assert np.abs(alone - pixels)[24:72, 12:52].max() < 0.01
 
 
 def test_a_small_shape_gets_the_colour_of_three_that_is_there():

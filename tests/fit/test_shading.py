@@ -21,6 +21,7 @@ from tests.fit.drawn import (
     box,
     disc,
     painted,
+    points,
     ramp,
     rings,
     shading_of,
@@ -90,6 +91,23 @@ def test_two_gradients_that_meet_get_no_third_colour_there():
     assert between.mean() < 0.02
     ends = np.linalg.norm(np.diff(shading.flats[[number - 1 for number in shading.graded]], axis=0))
     assert far[between].sum(axis=1) == pytest.approx(ends, abs=0.05)
+
+
+def test_a_gradient_with_a_thin_rim():
+    """Of another colour, two pixels wide: the next region begins beyond it."""
+    shading = shading_of(painted((disc(48, 44, 32), GREEN, 1.0), (disc(48, 44, 30), ramp(), 1.0)))
+    assert len(shading.graded) == 1
+
+
+def test_where_two_gradients_meet_that_are_not_one_each_pixel_is_of_one():
+    """The two sides of a roof: one rises to the right, one downwards, so steeply that the ridge is on neither."""
+    rise = 0.5 + 0.9 * (np.minimum(*points()) - 48)[..., None] / 48 * (1.0, 0.5, -1.0)
+    shading = shading_of(painted((box(24, 24, 72, 72), rise, 1.0)))
+    assert len(shading.graded) == 2
+    ends = shading.flats[[number - 1 for number in shading.graded]]
+    flat = shading.flattened.pixels[26:70, 26:70]
+    one, other = (np.linalg.norm(flat - end, axis=2) for end in ends)
+    assert (one + other).max() <= np.linalg.norm(ends[0] - ends[1]) + 0.02
 
 
 def test_too_small_a_share_of_the_picture_is_none():
