@@ -101,11 +101,11 @@ def test_a_gradient_with_a_thin_rim():
 
 def test_where_two_gradients_meet_that_are_not_one_each_pixel_is_of_one():
     """The two sides of a roof: one rises to the right, one downwards, so steeply that the ridge is on neither."""
-    rise = 0.5 + 0.9 * (np.minimum(*points()) - 48)[..., None] / 48 * (1.0, 0.5, -1.0)
-    shading = shading_of(painted((box(24, 24, 72, 72), rise, 1.0)))
+    rise = 0.5 + 0.9 * (np.minimum(*points()) - 48)[..., None] / 24 * (1.0, 0.5, -1.0)
+    shading = shading_of(painted((box(36, 36, 60, 60), rise, 1.0)))
     assert len(shading.graded) == 2
     ends = shading.flats[[number - 1 for number in shading.graded]]
-    flat = shading.flattened.pixels[26:70, 26:70]
+    flat = shading.flattened.pixels[38:58, 38:58]
     one, other = (np.linalg.norm(flat - end, axis=2) for end in ends)
     assert (one + other).max() <= np.linalg.norm(ends[0] - ends[1]) + 0.02
 
