@@ -144,7 +144,7 @@ def _few(picture: Picture, settings: Settings, callback: Callback) -> Fitted | N
         return None
     drawing = Drawing(drawn, settings, callback)
     scene = drawing.finished(repainted(found.scene, shading, ground))
-    if _has_target(settings):
+    if settings.shapes == AUTO:
         return _needed(drawing, scene, callback)
     return _told(drawing.sharpened(scene), picture, settings)
 
@@ -316,6 +316,7 @@ class Drawing:
         self.scene = from_scene(scene)
         with suppress(Stopped):
             self.scene = finished(self.scene, self.sizes, self.search)
+        self.error = error_of(self.scene, self.sizes.last)
         return concise(self._made(), self.picture, self.settings)
 
     def sharpened(self, scene: Scene) -> Scene:
