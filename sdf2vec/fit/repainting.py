@@ -19,6 +19,7 @@ from ..render.reference import canvas, layers_at
 from ..render.tensors import SceneTensors, from_scene
 from ..scene import Layer, Scene, Shape
 from ..shapes import KINDS
+from ..units import NEAREST_STOP
 from .bends import BentShade
 from .color_stops import ColorStops
 from .ramps import KIND, MARGIN, PAINT
@@ -30,6 +31,7 @@ LOOKED = 128  # pixels squared, at which is told which regions are seen of a lay
 NEAR = 0.1  # how far a channel of its colour may be from that of the region
 OPAQUE = 0.9  # at least
 UNSEEN = 3.0 / 255  # change of a colour from a shape's middle to its edge that is not worth a gradient
+LEAST = 0.05  # share of the way from a shape's middle to its edge on which there are such colours, if there are some
 OVER = 1.0 / 255  # beyond what a channel may be, by which it may seem to be there
 RADIAL = "radial"
 GRID = np.stack(np.meshgrid((-1.0, 0.0, 1.0), (-1.0, 0.0, 1.0)), axis=-1).reshape(-1, 2)  # of a shape's frame
@@ -133,7 +135,7 @@ def _colorful(color: Float64Array, change: Float64Array, extent: float) -> tuple
     """
     ends = np.sort((np.array([[-OVER], [1.0 + OVER]]) - color) / change, axis=0)
     low, high = max(float(ends[0].max()), -extent), min(float(ends[1].min()), extent)
-    return (low, high) if high > low else (-extent, extent)
+    return (low, high) if high - low > LEAST * extent else (-extent, extent)
 
 
 def _ringed(shape: Shape, rings: RadialShade, middle: Float64Array, back: Float64Array) -> Shape:
@@ -179,7 +181,11 @@ def _told(
     numbers = {name: np.asarray(value).tolist() for name, value in own.items()}
     if between:
         paint += str(len(stops.colors))
-        numbers |= {"color_middle": between[0], "stop": float((stops.values[1] - near) / (far - near))}
+        stop = (stops.values[1] - near) / (far - near)
+        numbers |= {
+            "color_middle": between[0],
+            "stop": float(np.clip(stop, NEAREST_STOP, 1.0 - NEAREST_STOP)),
+        }
     return Shape.of(shape.kind, first, paint, **shape.named(), color_end=last, **numbers)
 
 
