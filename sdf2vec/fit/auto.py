@@ -144,9 +144,7 @@ def _few(picture: Picture, settings: Settings, callback: Callback) -> Fitted | N
         return None
     drawing = Drawing(drawn, settings, callback)
     scene = drawing.finished(repainted(found.scene, shading, ground))
-    if settings.shapes == AUTO:
-        return _needed(drawing, scene, callback)
-    return _told(drawing.sharpened(scene), picture, settings)
+    return _needed(drawing, scene, callback)
 
 
 def _searched(drawn: Drawn, settings: Settings, callback: Callback) -> Fitted | None:
@@ -172,13 +170,13 @@ def _searched(drawn: Drawn, settings: Settings, callback: Callback) -> Fitted | 
 def _needed(drawing: Drawing, found: Scene, callback: Callback) -> Fitted:
     """What was found, or what goes on from it where that is not the drawing, or not as near as wanted."""
     picture, settings = drawing.picture, drawing.settings
-    if not _has_target(settings) and drawing.error > drawing.good:
+    if settings.shapes == AUTO and not _has_target(settings) and drawing.error > drawing.good:
         more = _enough(picture, settings, found, drawing.sizes.last, callback)
         if more is not found:
             return Fitted(more, _counted(more))
     found = drawing.sharpened(found)
     if not _has_target(settings):
-        return Fitted(found, _counted(found))
+        return _told(found, picture, settings)
     if missed(found, picture, settings) <= 0:
         return Fitted(found, f"{_counted(found)}: {wanted(settings)} is reached")
     scene, _ = meeting(picture, _going_on(settings, found), callback)
@@ -312,10 +310,12 @@ class Drawing:
         return concise(self._made(), self.picture, self.settings)
 
     def finished(self, scene: Scene) -> Scene:
-        """A scene after a last descent."""
+        """A scene after a last descent, without what is needless."""
         self.scene = from_scene(scene)
         with suppress(Stopped):
             self.scene = finished(self.scene, self.sizes, self.search)
+            if self.settings.shapes == AUTO:
+                self.scene = self._briefer(self.floor)
         self.error = error_of(self.scene, self.sizes.last)
         return concise(self._made(), self.picture, self.settings)
 

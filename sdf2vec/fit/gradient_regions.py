@@ -20,6 +20,10 @@ SMALLEST = 3  # pixels of a side, for anything to be even
 LEAST = 9  # pixels of a region
 KNEE, LEAST_KNEE = 3, 6  # pixels from where a gradient bends sharply to what is beside that; of such a place
 UNLIKE = 6.0 / 255  # from a region's colour, of what is none of it
+WHITE = 255  # levels
+GROUND = 0.2  # share of a region that is of one colour, at least, where gradients run into that
+NEAR = 1.5 / 255  # how far what is of that colour is from it at most
+MANY = 200  # pixels of such a gradient, at least
 COLORS = 3  # of a paint
 ALIKE = 3.0 / 255  # how far two regions of one gradient are from it, at most
 
@@ -57,11 +61,29 @@ def _told(pixels: Float32Array, calm: BoolArray, least: float) -> list[Region]:
         if share < least:
             return []
         shade = gradient_of(inside, pixels)
-        if shade is None:
-            share -= float(inside.mean())
-        else:
-            found.append(Region(inside, shade))
+        own = _on_ground(inside, pixels) if shade is None else [Region(inside, shade)]
+        found += own
+        share -= float(inside.mean()) - sum(float(region.inside.mean()) for region in own)
     return found if share >= least else []
+
+
+def _on_ground(inside: BoolArray, pixels: Float32Array) -> list[Region]:
+    """What is inside [H, W] of a picture that is no gradient: what is of its most frequent colour, and gradients that
+    run into that.
+    """
+    levels = np.rint(pixels[inside] * WHITE).astype(np.int64)
+    colors, counts = np.unique(levels, axis=0, return_counts=True)
+    if counts.max() < GROUND * len(levels):
+        return []
+    color = (colors[counts.argmax()] / WHITE).astype(np.float32)
+    flat = inside & (np.abs(pixels - color).max(axis=2) <= NEAR)
+    ground = gradient_of(flat, pixels)
+    if ground is None or not ground.is_flat:
+        return []
+    rest = largest(ndimage.label(inside & ~flat)[0], MANY)
+    told = ((part, gradient_of(part, pixels)) for part in rest)
+    found = [Region(part, shade) for part, shade in told if shade is not None and not shade.is_flat]
+    return [Region(flat, ground), *found] if found else []
 
 
 def _parts(region: Region) -> Iterator[Region]:

@@ -79,6 +79,12 @@ class Shading:
         return [number for number in numbers if _is_sharp(self.labels, number, self.calm)]
 
     @cached_property
+    def even(self) -> BoolArray:
+        """Where regions are of one colour [H, W]."""
+        is_flat = np.array([False, *(shade.is_flat for shade in self.shades)])
+        return np.asarray(is_flat[self.labels])
+
+    @cached_property
     def nearest(self) -> IntArray:
         """The number of the region that each pixel is in or next to, [H, W]."""
         _, (rows, columns) = ndimage.distance_transform_edt(self.labels == 0, return_indices=True)
@@ -141,12 +147,13 @@ class Shading:
         """How much is seen of a gradient, and where."""
         sides, small = self.pixels.shape[:2], self.labels.shape
         own = self.labels == number
-        around = ndimage.binary_dilation(own, iterations=REACH)
+        free = ~self.even  # what is of no other colour
+        around = ndimage.binary_dilation(own, iterations=REACH) & free
         part = larger(widened(extent(around), 1, small), sides, small)
-        own, around = (mask[_resized(small, sides, part)] for mask in (own, around))
+        own, around, free = (mask[_resized(small, sides, part)] for mask in (own, around, free))
         shown, color = self.shades[number - 1].at(*_places(sides, part)), self.flats[number - 1]
         apart = np.linalg.norm(self.pixels[part] - shown, axis=2)
-        near = ndimage.maximum_filter(around & (apart <= UNLIKE), 2 * REACH + 1)
+        near = ndimage.maximum_filter(around & (apart <= UNLIKE), 2 * REACH + 1) & free
         is_all = near & (apart <= np.where(own, BENT_AWAY, NOISE))
         return Seen(part, _share(apart, near), color - shown, is_all, color)
 

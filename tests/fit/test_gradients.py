@@ -76,6 +76,17 @@ def test_a_shape_of_three_colours_is_one(gradient, shape, told, drawn, request):
     assert quality(found.scene, picture).psnr >= 44
 
 
+def test_a_shape_that_fades_away_is_one(drawn):
+    """Into the ground: without an edge where it ends."""
+    fade = '<linearGradient id="g"><stop stop-color="#25e"/><stop offset="1" stop-color="#25e" stop-opacity="0"/>'
+    bar = '<rect x="16" y="36" width="96" height="56" rx="10" fill="url(#g)"/>'
+    picture = drawn(f"{fade}</linearGradient>{WHITE}{bar}", SIDE, SIDE)
+    found = fitted(picture)
+    (layer,) = found.scene.layers
+    assert [(shape.kind, shape.paint) for shape in layer.shapes] == [("box", "linear")]
+    assert quality(found.scene, picture).psnr >= 46
+
+
 def test_a_steep_ground_of_four_colours_is_no_photograph(drawn):
     """Nowhere two pixels beside each other are of one colour."""
     stops = zip((0, 33, 66, 100), ("#009fff", "#ec2f4b", "#ffe259", "#11998e"), strict=True)

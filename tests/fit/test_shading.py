@@ -11,6 +11,7 @@ from sdf2vec.fit.rings import RadialShade
 from sdf2vec.fit.shades import Shade
 from sdf2vec.fit.shading import Shading
 from tests.fit.drawn import (
+    BLUE,
     GREEN,
     HALF,
     RISE,
@@ -91,6 +92,22 @@ def test_two_gradients_that_meet_get_no_third_colour_there():
     assert between.mean() < 0.02
     ends = np.linalg.norm(np.diff(shading.flats[[number - 1 for number in shading.graded]], axis=0))
     assert far[between].sum(axis=1) == pytest.approx(ends, abs=0.05)
+
+
+def test_a_gradient_that_ends_in_the_colour_of_the_ground_is_none_of_that():
+    """There is no edge where it does."""
+    x, _ = points()
+    fade = WHITE + (1.0 - x / 80).clip(0.0)[..., None] * (BLUE - WHITE)
+    shading = shading_of(painted((box(16, 24, 80, 72), fade, 1.0)))
+    (number,) = shading.graded
+    inside = shading.labels == number
+    assert inside[30:66, 20:72].all()
+    assert not inside[:22].any()
+    assert not inside[:, 82:].any()
+    flat = shading.flattened.pixels
+    assert np.abs(flat[30:66, 20:72] - flat[48, 40]).max() == 0.0
+    assert np.abs(flat[48, 40] - WHITE).max() > 0.1
+    assert np.abs(flat[:22] - 1.0).max() == 0.0
 
 
 def test_a_gradient_with_a_thin_rim():
