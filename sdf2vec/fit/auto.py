@@ -48,7 +48,7 @@ from .simplify import sharing, simplified
 from .sparse import Round, grow, needed, taken_apart
 from .surroundings import View, error_of
 from .targets import meeting, missed, wanted
-from .views import scaled, view_of
+from .views import pixel_of, scaled, view_of
 
 THOROUGHLY = 12  # layers, at most, which in the end are tried without even where they matter
 SEARCH, JOINT, LAST, LARGEST = 56, 128, 320, 1024  # pixels squared
@@ -64,6 +64,7 @@ SOFT_MOST = 16  # shapes of a soft drawing
 SAMPLES = 4  # across a pixel, of a drawing that is antialiased
 SMALL = 72  # pixels along the longer side, at most, of a picture that is looked at by these: larger ones gain little
 GOOD = 10**-3.5  # mean squared error, 35 dB, of what is surely found
+WORSE = 2.0  # times the error that a picture without its gradients is found with: with them it is no worse
 FAR = 10**-2.5  # 25 dB, of what is not yet the picture
 DOMINANT = 0.15  # share of the most common colour, of a picture that has a ground
 # times the shapes found that are fitted where these alone are not the drawing; then, as many as allowed
@@ -143,6 +144,7 @@ def _few(picture: Picture, settings: Settings, callback: Callback) -> Fitted | N
     if found is None:
         return None
     drawing = Drawing(drawn, settings, callback)
+    drawing.good = max(drawing.good, WORSE * 10 ** (-psnr_of(found.scene, shading.flattened) / 10))
     scene = drawing.finished(repainted(found.scene, shading, ground))
     return _needed(drawing, scene, callback)
 
@@ -215,11 +217,6 @@ def _enough(picture: Picture, settings: Settings, found: Scene, view: View, call
         elif error_of(from_scene(best), view) <= FAR:
             break
     return best
-
-
-def pixel_of(picture: Picture) -> float:
-    """Its side in scene units."""
-    return 1.0 / min(picture.width, picture.height)
 
 
 def _nearest(scenes: Sequence[Scene], picture: Picture) -> Scene:
@@ -314,7 +311,7 @@ class Drawing:
         self.scene = from_scene(scene)
         with suppress(Stopped):
             self.scene = finished(self.scene, self.sizes, self.search)
-            if self.settings.shapes == AUTO:
+            if self.settings.shapes == AUTO and self.scene.layer_count <= THOROUGHLY:
                 self.scene = self._briefer(self.floor)
         self.error = error_of(self.scene, self.sizes.last)
         return concise(self._made(), self.picture, self.settings)

@@ -7,10 +7,15 @@ import math
 import numpy as np
 import torch
 
-from ..image import premultiply, resize, unpremultiply
+from ..image import Picture, premultiply, resize, unpremultiply
 from .settings import Settings
 from .surroundings import View
 from .weights import weights_for
+
+
+def pixel_of(picture: Picture) -> float:
+    """The side of its pixels in scene units."""
+    return 1.0 / min(picture.width, picture.height)
 
 
 def planes(pixels: np.ndarray) -> torch.Tensor:
