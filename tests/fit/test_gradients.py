@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from importlib import import_module
+
 import pytest
 
 from sdf2vec import fit, fitted
@@ -85,6 +87,15 @@ def test_a_shape_that_fades_away_is_one(drawn):
     (layer,) = found.scene.layers
     assert [(shape.kind, shape.paint) for shape in layer.shapes] == [("box", "linear")]
     assert quality(found.scene, picture).psnr >= 46
+
+
+def test_what_is_not_near_once_gradients_are_put_in_is_gone_on_with(shaded, monkeypatch):
+    """As where none is put in at all."""
+    monkeypatch.setattr(import_module("sdf2vec.fit.auto"), "repainted", lambda scene, shading, ground: scene)
+    picture = shaded(WHITE + BADGE)
+    found = fitted(picture, max_shapes=24)
+    assert found.scene.shape_count > 2
+    assert quality(found.scene, picture).psnr >= 24
 
 
 def test_a_steep_ground_of_four_colours_is_no_photograph(drawn):
