@@ -15,9 +15,8 @@ from .function import function
 from .operation import FLOAT, VEC2, VEC3
 from .units import COLOR, DIRECTION, RISE, SHIFT, STOP, Parameter
 
-Stops = tuple[
-    tuple[float, tuple[float, float, float]], ...
-]  # shares of the way, rising, and the colours there
+# shares of the way, rising, and the colours there
+Stops = tuple[tuple[float, tuple[float, float, float]], ...]
 
 
 class Ramp(NamedTuple):

@@ -22,9 +22,7 @@ LEAST_SMOOTHNESS = 1e-3  # scene units: of a join that is smooth at all
 HIGHEST_FREQUENCY = 60.0  # radians per scene unit
 STEEPEST = 10.0  # of a gradient: ranges of colour across half a shape
 FARTHEST = 6.0  # of those by which its middle is off that of the shape
-FIRST_STOP = (
-    0.01  # share of a gradient from its first colour to its middle one, at least, and from there to its last
-)
+FIRST_STOP = 0.01  # share of a gradient from its middle colour to that of an end, at least
 NEAREST_STOP = 0.02  # the same where a fit may move it
 FAINTEST = 0.02  # opacity where colours are not signed: below it a shape would stop learning
 GRAIN = 0.001  # scene units: falloffs much below it are packed in equal steps

@@ -14,16 +14,8 @@ FIRST_COMPACT = (
     "iXNkZgH6HvgGP/////7j08sezKA2ad2XDyAAMW/wAAAGMYx/3p/9Pvxn/en/en/O//en+eP3v+On/6I2r//yP/2f/gDg07aKJFpFLtpP/9/JZXMxd8"
     "4CMkRdOfR5g2LH"
 )
-PAINTED = (
-    "flat",
-    "linear",
-    "flat",
-    "radial",
-    "flat",
-    "linear3",
-    "flat",
-    "radial3",
-)  # one layer after the other
+# one layer after the other
+PAINTED = ("flat", "linear", "flat", "radial", "flat", "linear3", "flat", "radial3")
 SOFT = tuple(name for name in KINDS if name not in PATCHES)  # kinds with a soft edge, which can be joined
 
 

@@ -147,10 +147,8 @@ def test_the_rings_are_where_the_colours_end(turn, shift):
 
 
 THIRD = (0.5, 1.0, 0.25)
-OWN = {
-    "linear3": (0.5, 0.0, 0.0),
-    "radial3": (0.0, 0.0, 1.0, 1.0, 0.0),
-}  # along x of the frame, around its middle
+# along x of the frame, around its middle
+OWN = {"linear3": (0.5, 0.0, 0.0), "radial3": (0.0, 0.0, 1.0, 1.0, 0.0)}
 
 
 @pytest.mark.parametrize("stop", [0.25, 0.6])

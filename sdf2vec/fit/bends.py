@@ -4,13 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from scipy import ndimage
 from scipy.optimize import minimize_scalar
 
-from ..arrays import BoolArray, Float32Array, Float64Array
-from .color_stops import MIDDLES, Samples, StoppedShade, nearest_stops
+from ..arrays import Float32Array, Float64Array
+from .color_stops import MIDDLES, NEARLY, PLANE, Samples, StoppedShade, nearest_stops
 from .rings import LEAST, SMOOTH, smooth_slopes
 
 SCALES = (0.1,)  # of the search: radians
@@ -19,7 +20,7 @@ MANY, MOST = 800, 8  # pixels of a region of many colours, at least; so many col
 TURN = 0.1  # radians: how far a direction may be from where colours change most
 FINE = 1e-4  # radians: how exact it is
 BINS = 64  # places along a direction
-PLANE, NEARLY = 2.2 / 255, 0.98  # how far a region is from a gradient at most; share of it that is as near
+TINY = 1e-9
 
 
 @dataclass(frozen=True, eq=False)
@@ -38,47 +39,59 @@ class BentShade(StoppedShade):
         return found
 
 
-def bend_of(inside: BoolArray, pixels: Float32Array) -> BentShade | None:
-    """The linear gradient of three colours that is nearest to what is inside [H, W] of a picture [H, W, C]; None for
-    too few pixels, or where most are of one colour.
-    """
-    if inside.sum() < LEAST:
-        return None
-    line = Line.of(inside, pixels)
-    return line.nearest(_steepest(inside, line.colors), MIDDLES)
+@dataclass(frozen=True, eq=False)
+class Line:
+    """Samples whose colours may hang on how far they are along a line."""
 
+    samples: Samples
 
-def long_bends_of(inside: BoolArray, pixels: Float32Array) -> Iterator[BentShade]:
-    """The same of ever more colours; none where colours do not hang on how far they are along a line."""
-    if inside.sum() < MANY:
-        return
-    line = Line.of(inside, pixels)
-    angle = line.evenest(float(_steepest(inside, line.colors)[0]))
-    middles = line.bends(angle)
-    for count in range(2, len(middles) + 1):
-        bend = line.nearest(np.array([angle]), (tuple(sorted(middles[:count])),))
-        if bend is not None:
-            yield bend
+    def bend(self) -> BentShade | None:
+        """The nearest linear gradient of three colours; None for too few pixels, or where most are of one colour."""
+        return self._nearest(self._steepest, MIDDLES) if len(self.samples.x) >= LEAST else None
 
+    def long_bends(self) -> Iterator[BentShade]:
+        """The same of ever more colours; none where these do not hang on how far they are along a line."""
+        if len(self.samples.x) < MANY:
+            return
+        angle = self.evenest(self._steepest)
+        middles = self._bends(angle)
+        for count in range(2, len(middles) + 1):
+            bend = self._nearest(angle, (tuple(sorted(middles[:count])),))
+            if bend is not None:
+                yield bend
 
-class Line(Samples):
-    """What colours hang on how far they are along a line."""
+    @cached_property
+    def _steepest(self) -> float:
+        """The angle of the direction in which colours change most: by the structure tensor."""
+        inside, colors = self.samples.inside, self.samples.colors
+        core = ndimage.binary_erosion(inside, np.ones((3, 3)), iterations=round(SMOOTH))
+        core = core if core.any() else inside
+        channels = (colors - colors.mean(axis=0)).T
+        slopes = [np.stack(smooth_slopes(inside, channel))[:, core] for channel in channels]
+        across, down = np.linalg.eigh(sum(own @ own.T for own in slopes))[1][:, 1]
+        return float(np.arctan2(down, across))
 
-    def along(self, angle: float) -> Float64Array:
+    @cached_property
+    def _colors(self) -> Float32Array:
+        """Those that are looked at [P, C]."""
+        return self.samples.colors[self.samples.some]
+
+    def _along(self, angle: float) -> Float64Array:
         """How far those that are looked at are along a direction."""
-        found: Float64Array = self.x[self.some] * np.cos(angle) + self.y[self.some] * np.sin(angle)
+        x, y = self.samples.x[self.samples.some], self.samples.y[self.samples.some]
+        found: Float64Array = x * np.cos(angle) + y * np.sin(angle)
         return found
 
-    def nearest(self, start: Float64Array, middles: Sequence[tuple[float, ...]]) -> BentShade | None:
-        """The nearest gradient, from an angle [1] and shares of the way on."""
+    def _nearest(self, start: float, middles: Sequence[tuple[float, ...]]) -> BentShade | None:
+        """The nearest gradient, from an angle and shares of the way on."""
         (angle,), stops = nearest_stops(
-            lambda numbers: self.along(numbers[0]), start, SCALES, self.colors[self.some], middles
+            lambda numbers: self._along(numbers[0]), np.array([start]), SCALES, self._colors, middles
         )
-        along = self.x * np.cos(angle) + self.y * np.sin(angle)
+        along = self.samples.x * np.cos(angle) + self.samples.y * np.sin(angle)
         stops = stops.within(float(along.min()), float(along.max()))
         if stops.changing(along) < MOSTLY:
             return None
-        return BentShade(stops, np.array((np.cos(angle), np.sin(angle))) * self.sides)
+        return BentShade(stops, np.array((np.cos(angle), np.sin(angle))) * self.samples.sides)
 
     def evenest(self, angle: float) -> float:
         """The angle near to one, across which colours differ least."""
@@ -95,16 +108,16 @@ class Line(Samples):
         """How far colours [P, C] are from the mean at the same place along a direction; these means [B, C] and places
         [B], shares of the way.
         """
-        along = self.along(angle)
-        share = (along - along.min()) / max(np.ptp(along), 1e-9)
+        along = self._along(angle)
+        share = (along - along.min()) / max(np.ptp(along), TINY)
         bins = np.minimum((share * BINS).astype(int), BINS - 1)
         counts = np.bincount(bins, minlength=BINS)
-        sums = [np.bincount(bins, channel, BINS) for channel in self.colors[self.some].T]
+        sums = [np.bincount(bins, channel, BINS) for channel in self._colors.T]
         means = np.stack(sums, axis=1) / np.maximum(counts, 1)[:, None]
         there = counts > 0
-        return self.colors[self.some] - means[bins], means[there], (np.flatnonzero(there) + 0.5) / BINS
+        return self._colors - means[bins], means[there], (np.flatnonzero(there) + 0.5) / BINS
 
-    def bends(self, angle: float) -> list[float]:
+    def _bends(self, angle: float) -> list[float]:
         """Where colours bend along a direction, shares of the way, the farthest from a line first; none if they do not
         hang on that.
         """
@@ -121,15 +134,3 @@ class Line(Samples):
                 break
             chosen.append(int(worst.argmax()))
         return [float(places[index]) for index in chosen[2:]]
-
-
-def _steepest(inside: BoolArray, colors: Float32Array) -> Float64Array:
-    """The angle [1] of the direction in which colours [P, C] inside [H, W] change most: by the structure tensor."""
-    core = ndimage.binary_erosion(inside, np.ones((3, 3)), iterations=round(SMOOTH))
-    core = core if core.any() else inside
-    slopes = [
-        np.stack(smooth_slopes(inside, channel))[:, core] for channel in (colors - colors.mean(axis=0)).T
-    ]
-    tensor = sum(own @ own.T for own in slopes)
-    across, down = np.linalg.eigh(tensor)[1][:, 1]
-    return np.array([np.arctan2(down, across)])

@@ -4,13 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import NamedTuple, Self
+from typing import NamedTuple
 
 import numpy as np
 from scipy.optimize import least_squares
 
 from ..arrays import BoolArray, Float32Array, Float64Array, IntArray
-from .windows import Sides
 
 MOST_STEPS, NEARER = 60, 1e-4  # of the search; shares by which the error falls in one, at least
 LOOKED = 3000  # pixels that are looked at
@@ -22,6 +21,7 @@ NO_MIDDLE: Sequence[tuple[float, ...]] = ((),)
 SCALE = 0.1  # of the way, of the search
 TINY = 1e-6
 SAME = 2.0 / 255  # how far two colours are from each other at most that are one
+PLANE, NEARLY = 2.2 / 255, 0.98  # how far a region is from a gradient at most; share of it that is as near
 CHANGES = 6.0 / 255  # of a colour from one stop to the next, at least, where there is a gradient
 
 Measure = Callable[[Float64Array], Float64Array]
@@ -100,33 +100,34 @@ class StoppedShade:
 
 @dataclass(frozen=True, eq=False)
 class Samples:
-    """Places x, y [P] in shorter sides of a picture of so many rows and columns, the colours [P, C] there, and which of
-    them are looked at.
+    """Places x, y [P] in shorter sides of a picture, the colours [P, C] there, which of them are looked at, and where
+    they are inside [H, W].
     """
 
     x: Float64Array
     y: Float64Array
     colors: Float32Array
     some: IntArray
-    size: Sides
+    inside: BoolArray
 
     @classmethod
-    def of(cls, inside: BoolArray, pixels: Float32Array) -> Self:
+    def of(cls, inside: BoolArray, pixels: Float32Array) -> Samples:
         """What is inside [H, W] of a picture [H, W, C]."""
         rows, columns = np.nonzero(inside)
         unit = min(inside.shape)
         some = np.linspace(0, len(rows) - 1, min(len(rows), LOOKED)).astype(int)
-        return cls((columns + 0.5) / unit, (rows + 0.5) / unit, pixels[inside], some, inside.shape[:2])
+        return cls((columns + 0.5) / unit, (rows + 0.5) / unit, pixels[inside], some, inside)
 
     @property
     def unit(self) -> int:
         """The shorter side of the picture in pixels."""
-        return min(self.size)
+        height, width = self.inside.shape
+        return int(min(height, width))
 
     @property
     def sides(self) -> tuple[float, float]:
         """Its width and height in shorter sides."""
-        height, width = self.size
+        height, width = self.inside.shape
         return width / self.unit, height / self.unit
 
 

@@ -33,7 +33,7 @@ OPAQUE = 0.9  # at least
 UNSEEN = 3.0 / 255  # change of a colour from a shape's middle to its edge that is not worth a gradient
 LEAST = 0.05  # share of the way from a shape's middle to its edge on which there are such colours, if there are some
 OVER = 1.0 / 255  # beyond what a channel may be, by which it may seem to be there
-RADIAL = "radial"
+LINEAR_PAINTS, RADIAL_PAINTS = (PAINT, "linear3"), ("radial", "radial3")  # of two colours, of three
 GRID = np.stack(np.meshgrid((-1.0, 0.0, 1.0), (-1.0, 0.0, 1.0)), axis=-1).reshape(-1, 2)  # of a shape's frame
 
 
@@ -150,7 +150,7 @@ def _ringed(shape: Shape, rings: RadialShade, middle: Float64Array, back: Float6
     steepness = np.linalg.norm(stretched, axis=0) / (far - near)
     shares = np.linalg.norm((GRID - focus) * steepness, axis=1) - near / (far - near)
     own = {"focus": focus, "steepness": steepness, "shift": -near / (far - near)}
-    return _told(shape, rings.stops, shares, own, RADIAL)
+    return _told(shape, rings.stops, shares, own, RADIAL_PAINTS)
 
 
 def _bent(
@@ -162,14 +162,22 @@ def _bent(
     direction = back.T @ slope / (far - near)
     start = (shade.direction.sum() / 2 - back @ middle @ slope - near) / (far - near)
     return _told(
-        shape, shade.stops, start + GRID @ direction, {"direction": direction, "shift": start - 0.5}, PAINT
+        shape,
+        shade.stops,
+        start + GRID @ direction,
+        {"direction": direction, "shift": start - 0.5},
+        LINEAR_PAINTS,
     )
 
 
 def _told(
-    shape: Shape, stops: ColorStops, shares: Float64Array, own: dict[str, Float64Array | float], paint: str
+    shape: Shape,
+    stops: ColorStops,
+    shares: Float64Array,
+    own: dict[str, Float64Array | float],
+    paints: tuple[str, str],
 ) -> Shape:
-    """A shape in a paint of as many colours as there are stops, which are where the paint's numbers `own` say; in one,
+    """A shape in the paint of as many colours as stops, which are where the paint's numbers `own` say; in one,
     if it shows hardly more: `shares` of the way from the first stop to the last [P].
     """
     near, far = stops.values[[0, -1]]
@@ -180,13 +188,12 @@ def _told(
     first, *between, last = (tuple(color[:3].tolist()) for color in stops.colors.clip(0.0, 1.0))
     numbers = {name: np.asarray(value).tolist() for name, value in own.items()}
     if between:
-        paint += str(len(stops.colors))
         stop = (stops.values[1] - near) / (far - near)
         numbers |= {
             "color_middle": between[0],
             "stop": float(np.clip(stop, NEAREST_STOP, 1.0 - NEAREST_STOP)),
         }
-    return Shape.of(shape.kind, first, paint, **shape.named(), color_end=last, **numbers)
+    return Shape.of(shape.kind, first, paints[len(between)], **shape.named(), color_end=last, **numbers)
 
 
 @cache

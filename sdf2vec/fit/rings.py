@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from scipy import ndimage
@@ -39,51 +40,55 @@ class RadialShade(StoppedShade):
         return self.stops.at(away)
 
 
-def rings_of(
-    inside: BoolArray, pixels: Float32Array, middles: Sequence[tuple[float, ...]] = NO_MIDDLE
-) -> RadialShade | None:
-    """The radial gradient that is nearest to what is inside [H, W] of a picture [H, W, C]; None for
-    too few pixels, where most are of one colour, or where its middle is far away. `middles`: where colours between its
-    ends may start, shares of the way.
-    """
-    if inside.sum() < LEAST:
-        return None
-    seen = Samples.of(inside, pixels)
-    start = _middle(inside, (seen.colors - seen.colors.mean(axis=0)) @ main_axis(seen.colors), seen.unit)
-    x, y, colors = seen.x[seen.some], seen.y[seen.some], seen.colors[seen.some]
-    numbers, stops = nearest_stops(lambda numbers: _distances(x, y, numbers), start, SCALES, colors, middles)
-    if np.abs(numbers[:2] - [seen.x.mean(), seen.y.mean()]).max() > FARTHEST or abs(numbers[2]) > np.log(
-        ROUND
-    ):
-        return None
-    away = _distances(seen.x, seen.y, numbers)
-    stops = stops.within(float(away.min()), float(away.max()))
-    if away.min() * seen.unit < TIP and stops.values[0] * seen.unit < TIP:
-        stops = stops.begun(0.0)
-    if stops.changing(away) < MOSTLY:
-        return None
-    place = np.array(numbers[:2] / seen.sides, np.float32)
-    return RadialShade(stops, place, float(np.exp(numbers[2])), seen.sides)
+@dataclass(frozen=True, eq=False)
+class Around:
+    """Samples whose colours may hang on their distance from a point."""
 
+    samples: Samples
 
-def _middle(inside: BoolArray, share: Float64Array, unit: int) -> Float64Array:
-    """Where slopes point to, x and y, and the logarithm of how many times that along y counts: by least squares.
+    def rings(self, middles: Sequence[tuple[float, ...]] = NO_MIDDLE) -> RadialShade | None:
+        """The nearest radial gradient; None for too few pixels, where most are of one colour, or where its middle is
+        far away. `middles`: where colours between its ends may start, shares of the way.
+        """
+        seen = self.samples
+        if len(seen.x) < LEAST:
+            return None
+        x, y, colors = seen.x[seen.some], seen.y[seen.some], seen.colors[seen.some]
+        numbers, stops = nearest_stops(
+            lambda numbers: _distances(x, y, numbers), self._middle, SCALES, colors, middles
+        )
+        far = np.abs(numbers[:2] - [seen.x.mean(), seen.y.mean()]).max()
+        if far > FARTHEST or abs(numbers[2]) > np.log(ROUND):
+            return None
+        away = _distances(seen.x, seen.y, numbers)
+        stops = stops.within(float(away.min()), float(away.max()))
+        if away.min() * seen.unit < TIP and stops.values[0] * seen.unit < TIP:
+            stops = stops.begun(0.0)
+        if stops.changing(away) < MOSTLY:
+            return None
+        place = np.array(numbers[:2] / seen.sides, np.float32)
+        return RadialShade(stops, place, float(np.exp(numbers[2])), seen.sides)
 
-    Along a slope (u, v) from the middle (a, b) of ellipses k² (y − b) u = (x − a) v.
-    """
-    across, down = smooth_slopes(inside, share)
-    core = ndimage.binary_erosion(inside, np.ones((3, 3)), iterations=round(SMOOTH))
-    steep = np.hypot(across, down)
-    core &= steep > STEEP * np.quantile(steep[core], 0.95) if core.any() else core
-    rows, columns = np.nonzero(core if core.sum() >= LEAST // 2 else inside)
-    u, v = across[rows, columns], down[rows, columns]
-    x, y = (columns + 0.5) / unit, (rows + 0.5) / unit
-    terms = np.stack([u * y, -u, v], axis=1)
-    squared, moved, a = np.linalg.lstsq(terms, v * x)[0]
-    if not ROUND**-2 < squared < ROUND**2:  # of circles, which hang on fewer numbers
-        a, b = np.linalg.lstsq(np.stack([v, -u], axis=1), v * x - u * y)[0]
-        return np.array([a, b, 0.0])
-    return np.array([a, moved / squared, np.log(squared) / 2])
+    @cached_property
+    def _middle(self) -> Float64Array:
+        """Where slopes point to, x and y, and the logarithm of how many times that along y counts: by least squares.
+
+        Along a slope (u, v) from the middle (a, b) of ellipses k² (y − b) u = (x − a) v.
+        """
+        inside, colors, unit = self.samples.inside, self.samples.colors, self.samples.unit
+        across, down = smooth_slopes(inside, (colors - colors.mean(axis=0)) @ main_axis(colors))
+        core = ndimage.binary_erosion(inside, np.ones((3, 3)), iterations=round(SMOOTH))
+        steep = np.hypot(across, down)
+        core &= steep > STEEP * np.quantile(steep[core], 0.95) if core.any() else core
+        rows, columns = np.nonzero(core if core.sum() >= LEAST // 2 else inside)
+        u, v = across[rows, columns], down[rows, columns]
+        x, y = (columns + 0.5) / unit, (rows + 0.5) / unit
+        terms = np.stack([u * y, -u, v], axis=1)
+        squared, moved, a = np.linalg.lstsq(terms, v * x)[0]
+        if not ROUND**-2 < squared < ROUND**2:  # of circles, which hang on fewer numbers
+            a, b = np.linalg.lstsq(np.stack([v, -u], axis=1), v * x - u * y)[0]
+            return np.array([a, b, 0.0])
+        return np.array([a, moved / squared, np.log(squared) / 2])
 
 
 def smooth_slopes(inside: BoolArray, values: Float64Array) -> tuple[Float64Array, Float64Array]:

@@ -2,18 +2,20 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from itertools import chain
 from typing import NamedTuple
 
 import numpy as np
 
 from ..arrays import BoolArray, Float32Array
-from .bends import NEARLY, PLANE, BentShade, bend_of, long_bends_of
-from .color_stops import CHANGES, MIDDLES, NO_MIDDLE
-from .rings import RadialShade, rings_of
+from .bends import BentShade, Line
+from .color_stops import CHANGES, MIDDLES, NEARLY, PLANE, Samples
+from .rings import Around, RadialShade
 
-BENDS = 0.06  # how far it may be, too, by what its colour changes: as where there are more colours in between
+BENDS = (
+    0.06  # how far a region may be from one, too, by what its colour changes: as where there are more colours
+)
 LEAST_SHADED = 60  # pixels of a region that is no single colour
 
 
@@ -55,23 +57,39 @@ def gradient_of(inside: BoolArray, pixels: Float32Array) -> Gradient | None:
     colors, (x, y) = pixels[inside], places_in(inside)
     plane = _plane(x, y, colors)
     shown = plane.at(x, y)
-    if _is_told(shown, colors) and np.ptp(shown, axis=0).max() < CHANGES:
+    is_plane = _is_told(shown, colors)
+    if is_plane and np.ptp(shown, axis=0).max() < CHANGES:
         return Shade(plane.place, np.median(colors, axis=0), np.zeros_like(plane.slopes))
     if len(colors) < LEAST_SHADED or (colors.shape[1] == 4 and np.ptp(colors[:, 3]) > CHANGES):
         return None
-    found = list[Gradient]()
-    for told in chain([plane], _radial(inside, pixels), _bent(inside, pixels), long_bends_of(inside, pixels)):
-        if _is_told(told.at(x, y), colors):
+    if is_plane:
+        return plane
+    tried: list[tuple[Gradient, Float32Array]] = [(plane, shown)]
+    samples = Samples.of(inside, pixels)
+    around = Around(samples)
+    rings = around.rings()
+    for told in chain([] if rings is None else [rings], _bent(samples, around)):
+        shown = told.at(x, y)
+        if _is_told(shown, colors):
             return told
-        found.append(told)
-    return next((told for told in found if _is_told(told.at(x, y), colors, BENDS)), None)
+        tried.append((told, shown))
+    return next((told for told, shown in tried if _is_told(shown, colors, BENDS)), None)
 
 
 def bent_gradient(inside: BoolArray, pixels: Float32Array) -> Gradient | None:
     """The gradient of three colours or more that is near to what is inside; None where none is."""
-    places, colors = places_in(inside), pixels[inside]
-    found = chain(_bent(inside, pixels), long_bends_of(inside, pixels))
-    return next((told for told in found if _is_told(told.at(*places), colors)), None)
+    places, samples = places_in(inside), Samples.of(inside, pixels)
+    found = _bent(samples, Around(samples))
+    return next((told for told in found if _is_told(told.at(*places), samples.colors)), None)
+
+
+def _bent(samples: Samples, around: Around) -> Iterator[Gradient]:
+    """Along a line over a third colour, around a point, along a line over ever more."""
+    line = Line(samples)
+    for told in (line.bend, lambda: around.rings(MIDDLES)):
+        if (gradient := told()) is not None:
+            yield gradient
+    yield from line.long_bends()
 
 
 def places_in(inside: BoolArray) -> tuple[Float32Array, Float32Array]:
@@ -80,19 +98,6 @@ def places_in(inside: BoolArray) -> tuple[Float32Array, Float32Array]:
     rows, columns = np.nonzero(inside)
     x, y = (columns + 0.5) / width, (rows + 0.5) / height
     return x.astype(np.float32), y.astype(np.float32)
-
-
-def _radial(
-    inside: BoolArray, pixels: Float32Array, middles: Sequence[tuple[float, ...]] = NO_MIDDLE
-) -> Iterator[RadialShade]:
-    if (rings := rings_of(inside, pixels, middles)) is not None:
-        yield rings
-
-
-def _bent(inside: BoolArray, pixels: Float32Array) -> Iterator[Gradient]:
-    if (bend := bend_of(inside, pixels)) is not None:
-        yield bend
-    yield from _radial(inside, pixels, MIDDLES)
 
 
 def _is_told(shown: Float32Array, colors: Float32Array, bends: float = 0.0) -> bool:

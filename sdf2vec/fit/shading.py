@@ -17,13 +17,12 @@ from scipy import ndimage
 
 from ..arrays import BoolArray, Float32Array, IntArray
 from ..image import Picture, unpremultiply
-from .gradient_regions import UNLIKE, regions_of
-from .shades import Gradient
+from .gradient_regions import UNLIKE, WHITE, regions_of
+from .shades import Gradient, places_in
 from .slopes import even
 from .views import scaled
 from .windows import Part, Sides, extent, larger, widened
 
-WHITE = 255  # levels
 LOOKED = 320  # pixels squared, at which regions are looked for
 REACH = 3  # pixels beyond a region that its edge may show in
 BEYOND = 5  # pixels from it where there is another one, if its edge is sharp: it may have a thin rim
@@ -32,8 +31,6 @@ AROUND = 5  # pixels squared where an edge goes from one colour to the other
 NOISE, BENT_AWAY = 3.0 / 255, 16.0 / 255
 CLEAR = 0.7  # share of the difference of two regions that is left without gradients, at least, if it can be
 SHARP = 0.7  # share of what lies beyond a region's edge that is another region, at least
-
-EVERYWHERE: Part = slice(None), slice(None)
 
 
 class Seen(NamedTuple):
@@ -79,7 +76,7 @@ class Shading:
         return [number for number in numbers if _is_sharp(self.labels, number, self.calm)]
 
     @cached_property
-    def even(self) -> BoolArray:
+    def flat(self) -> BoolArray:
         """Where regions are of one colour [H, W]."""
         is_flat = np.array([False, *(shade.is_flat for shade in self.shades)])
         return np.asarray(is_flat[self.labels])
@@ -108,9 +105,8 @@ class Shading:
 
     def _choices(self, number: int) -> Float32Array:
         """Colours [5, C] of 8 bits that a gradient has: in its middle, and towards and at both ends."""
-        x, y = np.broadcast_arrays(*_places(self.labels.shape))
-        shade, inside = self.shades[number - 1], self.labels == number
-        away = shade.at(x[inside], y[inside]) - shade.color
+        shade = self.shades[number - 1]
+        away = shade.at(*places_in(self.labels == number)) - shade.color
         along = away @ shade.axis
         ends = (away[along.argsort()[round(share * (len(along) - 1))]] for share in (0.25, 0.75, 0.0, 1.0))
         choices = np.array([shade.color, *(shade.color + end for end in ends)])
@@ -119,11 +115,10 @@ class Shading:
 
     def _beside(self, number: int) -> Iterator[tuple[int, float]]:
         """The places among all of the regions that begin where one ends, and how far the colours are apart there."""
-        x, y = np.broadcast_arrays(*_places(self.labels.shape))
         inside = self.nearest == number
         for other in np.unique(self.nearest[ndimage.binary_dilation(inside) & ~inside]).tolist():
             edge = inside & ndimage.binary_dilation(self.nearest == other)
-            one, two = (self.shades[index - 1].at(x[edge], y[edge]) for index in (number, other))
+            one, two = (self.shades[index - 1].at(*places_in(edge)) for index in (number, other))
             far = float(np.linalg.norm(one - two, axis=1).mean())
             if far > UNLIKE:
                 yield other - 1, far
@@ -147,7 +142,7 @@ class Shading:
         """How much is seen of a gradient, and where."""
         sides, small = self.pixels.shape[:2], self.labels.shape
         own = self.labels == number
-        free = ~self.even  # what is of no other colour
+        free = ~self.flat  # what is of no other colour
         around = ndimage.binary_dilation(own, iterations=REACH) & free
         part = larger(widened(extent(around), 1, small), sides, small)
         own, around, free = (mask[_resized(small, sides, part)] for mask in (own, around, free))
@@ -158,7 +153,7 @@ class Shading:
         return Seen(part, _share(apart, near), color - shown, is_all, color)
 
 
-def _places(sides: Sides, part: Part = EVERYWHERE) -> tuple[Float32Array, Float32Array]:
+def _places(sides: Sides, part: Part) -> tuple[Float32Array, Float32Array]:
     """Where the pixels of a part of a picture are, x [1, w] and y [h, 1], by shares of its sides."""
     y, x = (
         ((np.arange(side)[seen] + 0.5) / side).astype(np.float32)
@@ -167,7 +162,7 @@ def _places(sides: Sides, part: Part = EVERYWHERE) -> tuple[Float32Array, Float3
     return x[None], y[:, None]
 
 
-def _resized(sides: Sides, wanted: Sides, part: Part = EVERYWHERE) -> tuple[IntArray, IntArray]:
+def _resized(sides: Sides, wanted: Sides, part: Part) -> tuple[IntArray, IntArray]:
     """Which rows [h, 1] and columns [1, w] of a picture are seen in a part of one of other sides."""
     rows, columns = (
         np.arange(new)[seen] * own // new for own, new, seen in zip(sides, wanted, part, strict=True)

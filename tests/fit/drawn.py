@@ -73,6 +73,18 @@ def three_rings():
     return np.stack([np.interp(share, (0.0, 0.4, 1.0), channel) for channel in THREE.T], axis=2)
 
 
+def everywhere(pixels):
+    """All of a picture [H, W, C]."""
+    return np.ones(pixels.shape[:2], bool)
+
+
+def shown(shade, pixels):
+    """A gradient at each pixel of a picture."""
+    height, width = pixels.shape[:2]
+    x, y = (np.arange(width) + 0.5) / width, (np.arange(height) + 0.5) / height
+    return shade.at(x.astype(np.float32)[None], y.astype(np.float32)[:, None])
+
+
 def view_of(pixels):
     return View(torch.from_numpy(np.ascontiguousarray(pixels.transpose(2, 0, 1))).float(), None)
 

@@ -5,7 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from sdf2vec.fit.bends import Line, bend_of, long_bends_of
+from sdf2vec.fit.bends import Line
+from sdf2vec.fit.color_stops import Samples
+from tests.fit.drawn import everywhere, shown
 
 COLORS = np.array([[0.9, 0.7, 0.3], [0.8, 0.2, 0.5], [0.3, 0.3, 0.8]])
 SIZE = 80, 120
@@ -19,21 +21,15 @@ def picture(angle, stops=(10.0, 60.0, 110.0), size=SIZE):
     return (np.rint(shown * 255) / 255).astype(np.float32)
 
 
-def everywhere(pixels):
-    return np.ones(pixels.shape[:2], bool)
-
-
-def shown(bend, pixels):
-    height, width = pixels.shape[:2]
-    x, y = (np.arange(width) + 0.5) / width, (np.arange(height) + 0.5) / height
-    return bend.at(x.astype(np.float32)[None], y.astype(np.float32)[:, None])
+def line_of(inside, pixels):
+    return Line(Samples.of(inside, pixels))
 
 
 @pytest.mark.parametrize("angle", [0.0, 0.5, 1.2])
 @pytest.mark.parametrize("stop", [35.0, 60.0, 90.0])
 def test_its_direction_its_stops_and_its_colours(angle, stop):
     pixels = picture(angle, (10.0, stop, 110.0))
-    bend = bend_of(everywhere(pixels), pixels)
+    bend = line_of(everywhere(pixels), pixels).bend()
     assert bend is not None
     across, down = bend.direction / (120, 80)  # for each pixel
     length = np.hypot(across, down)
@@ -50,7 +46,7 @@ def test_of_a_part_of_a_picture():
     inside = everywhere(pixels)
     inside[:, :30] = inside[:12] = False
     elsewhere = np.where(inside[..., None], pixels, np.float32(0.5))
-    bend = bend_of(inside, elsewhere)
+    bend = line_of(inside, elsewhere).bend()
     assert bend is not None
     assert np.abs(shown(bend, pixels) - pixels)[inside].max() < 0.008
     assert np.abs(shown(bend, pixels)[:, :29] - pixels[:, 30:31]).max() < 0.02
@@ -59,7 +55,7 @@ def test_of_a_part_of_a_picture():
 @pytest.mark.parametrize("off", [-0.07, 0.05])
 def test_the_direction_across_which_colours_are_even(off):
     pixels = picture(0.5)
-    line = Line.of(everywhere(pixels), pixels)
+    line = line_of(everywhere(pixels), pixels)
     assert line.evenest(0.5 + off) == pytest.approx(0.5, abs=0.003)
 
 
@@ -72,7 +68,7 @@ def test_of_many_colours():
     pixels = (np.rint(shades * 255) / 255).astype(np.float32)
     off = {
         len(bend.stops.values): np.abs(shown(bend, pixels) - pixels).max()
-        for bend in long_bends_of(everywhere(pixels), pixels)
+        for bend in line_of(everywhere(pixels), pixels).long_bends()
     }
     assert off[5] < 0.02
     assert off[4] > 0.1
@@ -81,11 +77,11 @@ def test_of_many_colours():
 def test_what_ends_softly_is_none():
     """Most of it is of one colour."""
     pixels = picture(0.3, (-9.0, -6.0, 16.0))
-    assert bend_of(everywhere(pixels), pixels) is None
+    assert line_of(everywhere(pixels), pixels).bend() is None
 
 
 def test_a_few_pixels_tell_none():
     pixels = picture(0.0)
     inside = np.zeros(pixels.shape[:2], bool)
     inside[:10, :10] = True
-    assert bend_of(inside, pixels) is None
+    assert line_of(inside, pixels).bend() is None

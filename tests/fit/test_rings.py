@@ -5,11 +5,15 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from sdf2vec.fit.color_stops import MIDDLES
-from sdf2vec.fit.rings import rings_of
-from tests.fit.drawn import HALF, RISE
+from sdf2vec.fit.color_stops import MIDDLES, NO_MIDDLE, Samples
+from sdf2vec.fit.rings import Around
+from tests.fit.drawn import HALF, RISE, everywhere, shown
 
 FIRST = HALF - 0.5 * RISE
+
+
+def rings_of(inside, pixels, middles=NO_MIDDLE):
+    return Around(Samples.of(inside, pixels)).rings(middles)
 
 
 def picture(middle, radii, span=(0.0, 1.0), size=(80, 120)):
@@ -18,16 +22,6 @@ def picture(middle, radii, span=(0.0, 1.0), size=(80, 120)):
     away = np.hypot((x - middle[0]) / radii[0], (y - middle[1]) / radii[1])
     share = ((away - span[0]) / (span[1] - span[0])).clip(0.0, 1.0)
     return (np.rint((FIRST + share[..., None] * RISE) * 255) / 255).astype(np.float32)
-
-
-def everywhere(pixels):
-    return np.ones(pixels.shape[:2], bool)
-
-
-def shown(rings, pixels):
-    height, width = pixels.shape[:2]
-    x, y = (np.arange(width) + 0.5) / width, (np.arange(height) + 0.5) / height
-    return rings.at(x.astype(np.float32)[None], y.astype(np.float32)[:, None])
 
 
 @pytest.mark.parametrize("middle", [(60.0, 40.0), (20.0, 70.0), (-30.0, 100.0)])
