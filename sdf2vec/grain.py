@@ -6,9 +6,12 @@ import math
 from typing import NamedTuple
 
 from .blend import OVER
-from .scene import Scene
+from .paints import FLAT
+from .scene import Scene, Shape
 
 FEW, SPARSE, MANY = 32, 64, 128  # layers
+BOX = "box"
+WHOLE = 0.01  # pixels by which an edge of whole pixels is off, at most
 FINER = 0.1  # share by which units may be more or less
 
 
@@ -36,8 +39,10 @@ class Grain(NamedTuple):
         share = math.sqrt(min(1.0, max(count, 1) / MANY))
         softnesses = min(self.softnesses, max(self.fewest, round(self.softnesses * share)))
         runs = self.runs if count >= MANY else min(self.runs, 1)
-        about = round(self.units * max(1.0, count / SPARSE) ** self.shrink)
-        units = _in_proportion(about, scene.width, scene.height)
+        units = min(scene.width, scene.height)
+        if not is_of_pixels(scene):
+            about = round(self.units * max(1.0, count / SPARSE) ** self.shrink)
+            units = _in_proportion(about, scene.width, scene.height)
         return self._replace(units=units, softnesses=softnesses, filter=self.filter / share, runs=runs)
 
     @property
@@ -96,6 +101,27 @@ class Drawable(NamedTuple):
 def is_drawable(scene: Scene) -> bool:
     """Whether a blurred element can draw each of a scene's layers."""
     return scene.compositing == OVER and not any(layer.is_patch for layer in scene.layers)
+
+
+def is_of_pixels(scene: Scene) -> bool:
+    """Whether all layers are sharp upright boxes of whole pixels, as those of pixel art."""
+    return all(
+        len(layer.shapes) == 1 and not layer.falloff and _is_of_pixels(layer.shapes[0], scene)
+        for layer in scene.layers
+    )
+
+
+def _is_of_pixels(shape: Shape, scene: Scene) -> bool:
+    if shape.kind != BOX or shape.paint != FLAT:
+        return False
+    x, y, across, down, angle, radius = shape.parameters
+    ends = [(x + sign * across, y + sign * down) for sign in (-1.0, 1.0)]
+    places = [
+        0.5 * side + place / scene.pixel
+        for end in ends
+        for side, place in zip((scene.width, scene.height), end, strict=True)
+    ]
+    return not angle and not radius and all(abs(place - round(place)) < WHOLE for place in places)
 
 
 def is_few_and_sharp(scene: Scene) -> bool:

@@ -376,7 +376,9 @@ def premultiply(pixels: Float32Array) -> Float32Array:
 
 
 def unpremultiply(pixels: Float32Array) -> Float32Array:
-    """Premultiplied to straight alpha: colour over alpha, black where alpha is 0. [H, W, 4], a new array."""
+    """Premultiplied to straight alpha: colour over alpha, black where alpha is 0. [H, W, 4]; [H, W, 3] as it is."""
+    if pixels.shape[2] == 3:
+        return pixels
     alpha = pixels[..., 3:]
     colour = np.divide(pixels[..., :3], alpha, out=np.zeros_like(pixels[..., :3]), where=alpha > 0)
     return np.concatenate([colour, alpha], axis=2)

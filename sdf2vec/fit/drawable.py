@@ -13,7 +13,7 @@ import torch
 from ..arrays import Float64Array
 from ..blend import EDGE_DEVIATION, SUBTRACTION
 from ..clusters import clustered
-from ..grain import Drawable, Grain
+from ..grain import Drawable, Grain, is_of_pixels
 from ..layer import Slot
 from ..render.tensors import Group, SceneTensors, from_scene, to_scene
 from ..scene import Scene
@@ -48,6 +48,8 @@ TINY = 1e-12
 
 def rounded(scene: Scene, grain: Grain) -> Drawable:
     """The scene with all numbers such that a drawing of this grain can say them."""
+    if is_of_pixels(scene):
+        return Drawable(scene)
     tensors = from_scene(scene)
     softening, settling = _begun(tensors, scene, grain)
     if softening:
@@ -63,6 +65,8 @@ def drawable(scene: Scene, views: Views, grain: Grain, coarser: Scene | None = N
 
     `coarser`: what came of the scene for a coarser drawing. Going on from it ends nearer, and takes half the time.
     """
+    if is_of_pixels(scene):
+        return Drawable(scene)
     tensors = from_scene(coarser or scene)
     softening, settling = _begun(tensors, scene, grain)
     phases: Sequence[Phase] = GOING_ON if coarser else PHASES

@@ -1,4 +1,4 @@
-"""A ground that runs from one colour to another: a box over all of the canvas, in the linear paint."""
+"""The ground of a picture: its colour, or a box over all of the canvas where it runs from one colour to another."""
 
 from __future__ import annotations
 
@@ -10,8 +10,11 @@ from ..layer import Part, Slot, slots
 from ..paints import FLAT, PAINTS, Ramp
 from ..render import fused
 from ..render.tensors import Group, SceneTensors
+from .initialization import FAINTEST_GROUND, background_of
+from .jagged import ALIKE
 from .joining import Search, inserted
 from .laying import Points
+from .offers import common_color
 from .surroundings import Surroundings, View, layer_at, points_of
 
 PAINT, KIND = "linear", "box"
@@ -24,6 +27,7 @@ SHARE, MORE = 0.3, 1.5  # least share of the canvas that is a ramp; and of what 
 MARGIN = 0.1  # scene units by which the box is larger than the canvas
 LEAST_CHANGE = 0.02  # of a colour across the canvas
 STEPS, TRIMS = 10, 4
+DOMINANT = 0.15  # share of the most common colour, of a picture that has a ground
 
 
 class Plane(NamedTuple):
@@ -36,6 +40,22 @@ class Plane(NamedTuple):
     slopes: torch.Tensor
     near: torch.Tensor  # [P]
     explains: float
+
+
+def ground_of(target: torch.Tensor) -> torch.Tensor:
+    """A colour of a picture [C, H, W] that dominates, that of its rim before the most common, else the mean; none where
+    it has holes.
+    """
+    if len(target) == 4:
+        return background_of(target) if float(target[3].min()) >= FAINTEST_GROUND else torch.zeros(4)
+    colors, rim = target.flatten(1).T, torch.ones(target.shape[1:])
+    rim[1:-1, 1:-1] = 0.0
+    for weights in (rim.flatten(), torch.ones(len(colors))):
+        common = common_color(colors, weights)
+        near = (colors - common).abs().amax(1) < ALIKE
+        if float(near.float().mean()) >= DOMINANT:
+            return torch.cat([common, torch.ones(1)])
+    return torch.cat([colors.mean(0), torch.ones(1)])
 
 
 def grounded(scene: SceneTensors, view: View, search: Search) -> SceneTensors:

@@ -132,6 +132,11 @@ class Settings(Struct, frozen=True):
         return self.max_shapes if self.shapes == AUTO else self.shapes
 
     @property
+    def has_target(self) -> bool:
+        """Whether it is told how near a fit is to come."""
+        return (self.target_psnr, self.target_flip) != (None, None)
+
+    @property
     def kinds(self) -> tuple[str, ...]:
         """What a picture that is no drawing is painted with."""
         return self.kind or PAINTED

@@ -136,7 +136,7 @@ class Shading:
         for each in seen:
             flat[each.part][each.is_all] = each.color
         flat = flat.clip(0.0, 1.0)
-        return Picture(unpremultiply(flat) if flat.shape[2] == 4 else flat)
+        return Picture(unpremultiply(flat))
 
     def _seen(self, number: int) -> Seen:
         """How much is seen of a gradient, and where."""

@@ -9,7 +9,7 @@ from sdf2vec.fit.shading import Shading
 from sdf2vec.fit.surroundings import View
 from sdf2vec.image import Picture, resize
 from sdf2vec.render.tensors import SceneTensors
-from sdf2vec.scene import Layer, Shape
+from sdf2vec.scene import Layer, Scene, Shape
 
 WHITE, BLUE, RED, GREEN = (
     np.array(c) for c in ((1, 1, 1), (0.1, 0.2, 0.8), (0.9, 0.1, 0.1), (0.2, 0.7, 0.3))
@@ -132,3 +132,10 @@ def noise():
     """Nothing that a few shapes could be."""
     coarse = np.random.default_rng(0).random((8, 12, 3), dtype=np.float32)
     return Picture(np.ascontiguousarray(resize(coarse, 48, 32)))
+
+
+def hidden(count, level):
+    """A grey picture with so many discs that are not seen."""
+    grey = (level, level, level)
+    disc = Layer((Shape("circle", (0.0, 0.0, 0.1), grey),))
+    return Scene(64, 64, (disc,) * count, grey)

@@ -13,21 +13,18 @@ from skimage import data
 from sdf2vec import Scene, Sdf2vecError, fit, fitted, render
 from sdf2vec.bench.known_scenes import known_scene
 from sdf2vec.fit import auto
-from sdf2vec.fit.auto import ground_of
-from sdf2vec.fit.descents import finished
 from sdf2vec.fit.drawings import Drawn
+from sdf2vec.fit.finding import GOOD, Drawing
 from sdf2vec.fit.initialization import Layers
 from sdf2vec.fit.joining import Search
 from sdf2vec.fit.one_more import gain_of_one_more
-from sdf2vec.fit.pruning import FLOOR
+from sdf2vec.fit.ramps import ground_of
 from sdf2vec.fit.settings import settings_of
-from sdf2vec.fit.sparse import Round
 from sdf2vec.fit.surroundings import View
 from sdf2vec.image import Picture, load
 from sdf2vec.quality import quality
-from sdf2vec.render.tensors import from_scene
 from sdf2vec.scene import Layer, Shape
-from tests.fit.drawn import BLUE, SIDE, disc, noise, painted, sharp_disc
+from tests.fit.drawn import hidden, noise
 from tests.fit.fitting import remember
 
 WHITE = '<rect width="100%" height="100%" fill="white"/>'
@@ -226,13 +223,13 @@ def test_told_how_many_shapes_only_kinds_that_the_user_allows_are_found(drawn):
 
 @pytest.mark.usefixtures("few_steps")
 def test_a_painting_is_not_searched_for_as_many_shapes_as_told(monkeypatch):
-    monkeypatch.setattr(auto.Drawing, "found", lambda self: pytest.fail("it is no drawing"))
+    monkeypatch.setattr(Drawing, "found", lambda self: pytest.fail("it is no drawing"))
     assert fit(noise(), 8).shape_count == 8
 
 
 @pytest.mark.usefixtures("few_steps")
 def test_the_fast_preset_does_not_search_for_as_many_shapes_as_told(drawn, monkeypatch):
-    monkeypatch.setattr(auto.Drawing, "found", lambda self: pytest.fail("it is to be fast"))
+    monkeypatch.setattr(Drawing, "found", lambda self: pytest.fail("it is to be fast"))
     assert fit(drawn(DISCS), 8, preset="fast").shape_count == 8
 
 
@@ -244,7 +241,7 @@ def test_an_enlarged_photograph_is_not_searched_for_as_many_shapes_as_told():
     assert auto._few(picture, settings_of(8), lambda progress: False) is None
 
 
-@pytest.mark.parametrize(("error", "begun"), [(auto.GOOD / 2, [1]), (auto.GOOD * 2, [1, 0])])
+@pytest.mark.parametrize(("error", "begun"), [(GOOD / 2, [1]), (GOOD * 2, [1, 0])])
 def test_what_is_found_far_from_a_drawing_is_fitted_from_nothing_too(error, begun, drawn, monkeypatch):
     """The nearer is kept: here what begins with nothing, as what begins with all black ends so."""
     picture, blank = drawn(DISCS), Scene(96, 96, (), (0.0, 0.0, 0.0))
@@ -261,7 +258,7 @@ def test_what_is_found_far_from_a_drawing_is_fitted_from_nothing_too(error, begu
         starts.append(len(settings.start.layers) if settings.start else 0)
         return black if settings.start else replace(blank, background=(1.0, 1.0, 1.0))
 
-    monkeypatch.setattr(auto.Drawing, "found", found)
+    monkeypatch.setattr(Drawing, "found", found)
     monkeypatch.setattr(auto, "fit_concisely", fitted_from)
     made = fit(picture, 8)
     assert starts == begun
@@ -426,13 +423,13 @@ def test_a_drawing_of_other_things_takes_more_shapes_while_its_description_gets_
 
     def fitted_with(picture, settings, callback):
         asked.append(settings.shapes)
-        return _hidden(settings.shapes, 0.5 - 1 / 255)
+        return hidden(settings.shapes, 0.5 - 1 / 255)
 
     monkeypatch.setattr(auto, "fit_concisely", fitted_with)
     picture = Picture(np.full((64, 64, 3), 0.5, np.float32))
     picture.pixels[:, :32] += 1 / 255
     view = View(torch.from_numpy(picture.pixels).permute(2, 0, 1), None)
-    found = _hidden(2, 0.3)
+    found = hidden(2, 0.3)
     found = replace(found, background=(0.3, 0.5, 0.5))
     enough = auto._enough(picture, settings_of(), found, view, lambda progress: False)
     assert asked == [4, 8]
@@ -460,68 +457,15 @@ def test_what_is_far_from_a_drawing_tries_all_numbers(found, off, tried, wanted,
 
     def fitted_with(picture, settings, callback):
         asked.append(settings.shapes)
-        return _hidden(settings.shapes, 0.5 - off)
+        return hidden(settings.shapes, 0.5 - off)
 
     monkeypatch.setattr(auto, "fit_concisely", fitted_with)
     picture = Picture(np.full((64, 64, 3), 0.5, np.float32))
     view = View(torch.from_numpy(picture.pixels).permute(2, 0, 1), None)
-    scene = _hidden(found, 0.5 - off)
+    scene = hidden(found, 0.5 - off)
     enough = auto._enough(picture, settings_of(max_shapes=48), scene, view, lambda progress: False)
     assert asked == tried
     assert enough.shape_count == wanted
-
-
-@pytest.mark.parametrize(
-    ("color", "radius", "layers"), [((0.999, 0.999, 0.999), 5.0, 1), ((0.85, 0.85, 0.85), 1.5, 2)]
-)
-def test_what_shortens_the_description_stays_even_where_nothing_seems_missing(color, radius, layers):
-    """Without a small grey dot the picture is 47 dB near; one of a quarter of a level does not pay for itself."""
-    pixels = painted((disc(40, 40, 20), BLUE, 1.0), (disc(80, 80, radius), color, 1.0))
-    drawing = auto.Drawing(
-        Drawn.of(Picture(pixels.astype(np.float32))), settings_of(), lambda progress: False
-    )
-    dot = sharp_disc(color, 80, 80, radius)
-    scene = from_scene(Scene(SIDE, SIDE, (sharp_disc(BLUE, 40, 40), dot), (1.0, 1.0, 1.0)))
-    drawing.scene = finished(scene, drawing.sizes, drawing.search)
-    assert drawing._briefer(FLOOR).layer_count == layers
-
-
-def test_a_round_that_only_takes_layers_away_does_not_end_the_search():
-    """Its error may be a little higher than before: that says nothing about how many more are needed."""
-    drawing = auto.Drawing(replace(Drawn.of(noise()), flat=True), settings_of(), lambda progress: False)
-    drawing.scene = from_scene(_hidden(13, 0.5))
-    assert not drawing._is_no_drawing(Round(from_scene(_hidden(12, 0.5)), 2e-4, 1e-4))
-    assert drawing._is_no_drawing(Round(from_scene(_hidden(14, 0.5)), 2e-4, 1e-4))
-
-
-@pytest.mark.parametrize(
-    ("outlined", "gains", "made"),
-    [
-        (6, [3, 0.6, 0.6, 0.6, 0.6], 4),
-        (6, [3, 0.6, 0.6, 3, 3, 3, 3], 7),
-        (6, [9, 0.6, 0.6, 0.6, 0.6], 5),
-        (14, [3, 0.6, 0.6, 0.6, 0.6], 5),
-    ],
-    ids=["slow", "quick again", "nearly there", "most layers outlined"],
-)
-def test_a_search_that_would_not_find_the_drawing_ends(outlined, gains, made, monkeypatch):
-    """From 26 dB on, by so many dB a round; with 18 layers."""
-    errors = [10 ** -(2.6 + sum(gains[:count]) / 10) for count in range(len(gains) + 1)]
-    rounds = iter(
-        [Round(from_scene(_hidden(18, 0.5)), *pair) for pair in zip(errors[1:], errors, strict=False)]
-    )
-    monkeypatch.setattr(auto, "taken_apart", lambda *rest: from_scene(_hidden(outlined, 0.5)))
-    monkeypatch.setattr(auto, "grow", lambda *rest: rounds)
-    monkeypatch.setattr(auto.Drawing, "_finish", lambda self: None)
-    auto.Drawing(replace(Drawn.of(noise()), flat=True), settings_of(), lambda progress: False).found()
-    assert len(list(rounds)) == len(gains) - made
-
-
-def _hidden(count, level):
-    """A grey picture with so many discs that are not seen."""
-    grey = (level, level, level)
-    disc = Layer((Shape("circle", (0.0, 0.0, 0.1), grey),))
-    return Scene(64, 64, (disc,) * count, grey)
 
 
 @pytest.mark.parametrize("size", [(160, 120), (136, 136), (180, 100)])

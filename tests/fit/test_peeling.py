@@ -11,8 +11,8 @@ from PIL import Image
 
 from sdf2vec.api import render
 from sdf2vec.fit import descents, peeling, pruning, sparse
-from sdf2vec.fit.auto import Drawing
 from sdf2vec.fit.drawings import Drawn
+from sdf2vec.fit.finding import Drawing
 from sdf2vec.fit.outlining import best_outlined
 from sdf2vec.fit.peeling import peeled
 from sdf2vec.fit.region_graph import Regions

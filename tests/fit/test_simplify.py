@@ -6,8 +6,8 @@ import torch
 
 from sdf2vec import Scene, fit
 from sdf2vec.fit import simplify
-from sdf2vec.fit.auto import Drawing
 from sdf2vec.fit.drawings import Drawn
+from sdf2vec.fit.finding import Drawing
 from sdf2vec.fit.initialization import Layers
 from sdf2vec.fit.joining import Search
 from sdf2vec.fit.ramps import grounded, lowest

@@ -1,0 +1,333 @@
+"""Pictures made of upright rectangles, pixel by pixel, as pixel art, codes and boards are: boxes tell them exactly.
+
+Pixels are taken together to cells, between lines on which anything changes. Colours lie on each other in an order, so
+that a box may go on below what is laid on it: each colour's cells are covered by as few rectangles as a greedy set
+cover takes (Chvátal 1979) of all that are maximal.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
+from itertools import pairwise
+from typing import NamedTuple
+
+import numpy as np
+from scipy import ndimage
+
+from ..arrays import BoolArray, Float32Array, Float64Array, IntArray
+from ..blend import EDGE_DEVIATION
+from ..scene import Color, Layer, Scene, Shape
+from .jagged import alike
+
+KIND = "box"
+LINES = 128  # along a side, at most, on which anything changes
+CORNERS = 4  # that a box adds to a picture, at most
+OFF = 8.0 / 255  # by which pixels of an edge are off at most, where others cross it
+SOFTEST = 6  # pixels of an edge between cells, at most
+SOFT = 0.9  # of half a box, its falloff, at most
+OF_CELLS, FEW = 0.5, 4  # boxes for each cell, at most, but always so many: gradients take one for each
+
+
+class Cells(NamedTuple):
+    """A picture's cells [R, Q]: places of the lines between them in pixels, with both ends; colours [K, C], and which.
+
+    `deviation`: the standard deviation of their edges in pixels, 0 for sharp ones.
+    """
+
+    across: Float64Array
+    down: Float64Array
+    colors: Float32Array
+    which: IntArray
+    deviation: float
+
+    @classmethod
+    def of(cls, pixels: Float32Array, limit: float) -> Cells | None:
+        """Those of a picture [H, W, C], that changes where pixels differ by more than a limit; None of too many."""
+        down, across = _lines(pixels, limit), _lines(np.swapaxes(pixels, 0, 1), limit)
+        if max(len(down), len(across)) > LINES + 1:
+            return None
+        cells = pixels[down[:-1]][:, across[:-1]]
+        if not alike(pixels, cells.repeat(np.diff(down), 0).repeat(np.diff(across), 1), limit).all():
+            return None
+        places_down, cells, softness = _between_edges(down, cells)
+        places_across, turned, more = _between_edges(across, np.swapaxes(cells, 0, 1))
+        colors, which = _told_apart(np.swapaxes(turned, 0, 1), limit)
+        deviation = math.sqrt(np.mean([*softness, *more])) if softness or more else 0.0
+        return cls(places_across, places_down, colors, which, deviation)
+
+    @property
+    def fewest(self) -> int:
+        """So many boxes at least: each adds one colour, and four corners at most, where one of four cells differs."""
+        below, beside = self.which[1:] != self.which[:-1], self.which[:, 1:] != self.which[:, :-1]
+        corners = (below[:, 1:] ^ below[:, :-1]) & (beside[1:] ^ beside[:-1])
+        return max(int(corners.sum()) // CORNERS, len(self.colors) - 1)
+
+    @property
+    def is_solid(self) -> bool:
+        """Whether all colours are opaque, or none at all."""
+        return self.colors.shape[1] == 3 or bool(np.isin(self.colors[:, 3], (0.0, 1.0)).all())
+
+    @property
+    def is_soft(self) -> bool:
+        """Whether cells are next to others of hardly another colour, as they are in gradients."""
+        return any(
+            bool((alike(self.colors[one], self.colors[other]) & (one != other)).any())
+            for one, other in ((self.which[1:], self.which[:-1]), (self.which[:, 1:], self.which[:, :-1]))
+        )
+
+    def color(self, number: int) -> Color:
+        """A colour by its number."""
+        red, green, blue = self.colors[number, :3].tolist()
+        return red, green, blue
+
+    @property
+    def sizes(self) -> Float64Array:
+        """How many pixels each cell has, [R, Q]."""
+        return np.outer(np.diff(self.down), np.diff(self.across)).astype(np.float64)
+
+    @property
+    def clear(self) -> BoolArray:
+        """Which cells are transparent, [R, Q]."""
+        alpha = self.colors[:, 3] if self.colors.shape[1] == 4 else np.ones(len(self.colors))
+        return np.asarray(alpha[self.which] == 0.0)
+
+    @property
+    def ground(self) -> int | None:
+        """The number of the colour that most of the rim has; none where anything is transparent."""
+        if self.clear.any():
+            return None
+        rim = np.pad(np.zeros(np.maximum(np.array(self.which.shape) - 2, 0), bool), 1, constant_values=True)
+        rim = rim[: self.which.shape[0], : self.which.shape[1]]
+        areas = np.bincount(self.which[rim], self.sizes[rim])
+        return int(areas.argmax())
+
+    @property
+    def depths(self) -> IntArray:
+        """How many edges are between each cell and the ground, or what is transparent, [R, Q]: there it is 0."""
+        ground = self.ground
+        on_ground = self.clear if ground is None else _at_rim(self.which == ground)
+        depths = np.where(on_ground, 0, -1)
+        parts = _parts(self.which)
+        while (depths < 0).any():
+            reached = ndimage.binary_dilation(depths >= 0) & (depths < 0)
+            depths[np.isin(parts, parts[reached]) & (depths < 0)] = depths.max() + 1
+        return depths
+
+
+class Tile(NamedTuple):
+    """A rectangle of cells: rows and columns from one up to another."""
+
+    top: int
+    bottom: int
+    left: int
+    right: int
+
+
+def mosaic(pixels: Float32Array, most: int, limit: float = 0.0) -> Scene | None:
+    """The boxes that premultiplied pixels [H, W, C] are made of, at most so many; None where there is more to them.
+
+    `limit`: by how much pixels of one colour may differ.
+    """
+    cells = Cells.of(pixels, limit)
+    if cells is None or cells.fewest > most or cells.is_soft or not cells.is_solid:
+        return None
+    most = min(most, max(int(OF_CELLS * cells.which.size), FEW))
+    found = min((_laid(cells, order) for order in _orders(cells)), key=len)
+    return _scene(cells, found) if len(found) <= most else None
+
+
+def _parts(which: IntArray) -> IntArray:
+    """The numbers of the connected parts of one colour, from 1, of cells [R, Q]."""
+    parts, count = np.zeros(which.shape, int), 0
+    for color in np.unique(which):
+        labels, found = ndimage.label(which == color)
+        parts += np.where(labels > 0, labels + count, 0)
+        count += found
+    return parts
+
+
+def _at_rim(cells: BoolArray) -> BoolArray:
+    """Those of some cells [R, Q] that are connected to a side of the picture."""
+    labels, _ = ndimage.label(cells)
+    sides = np.concatenate([labels[0], labels[-1], labels[:, 0], labels[:, -1]])
+    return np.isin(labels, sides[sides > 0])
+
+
+def _lines(pixels: Float32Array, limit: float) -> IntArray:
+    """Where rows of pixels differ from those before: so many rows down, and both ends."""
+    changes = np.flatnonzero(~alike(pixels[1:], pixels[:-1], limit).all(axis=1)) + 1
+    return np.array([0, *changes, len(pixels)])
+
+
+def _told_apart(cells: Float32Array, limit: float) -> tuple[Float32Array, IntArray]:
+    """The colours [K, C] of cells [R, Q, C], and which each has [R, Q]: those that are alike are one, the commonest."""
+    colors, which, counts = np.unique(
+        cells.reshape(-1, cells.shape[2]), axis=0, return_inverse=True, return_counts=True
+    )
+    same = np.full(len(colors), -1)
+    for color in np.argsort(-counts, kind="stable"):
+        if same[color] < 0:
+            same[(same < 0) & alike(colors, colors[color], limit)] = color
+    kept, numbers = np.unique(same, return_inverse=True)
+    return colors[kept], numbers[which].reshape(cells.shape[:2])
+
+
+def _between_edges(lines: IntArray, rows: Float32Array) -> tuple[Float64Array, Float32Array, list[float]]:
+    """Lines [R + 1] and rows [R, Q, C] without those of one pixel that are soft or antialiased edges between wide ones.
+
+    There is one line, in the middle of the edge. And the variances of edges of several pixels.
+    """
+    places, kept, variances = lines[:-1].astype(np.float64), np.ones(len(rows), bool), list[float]()
+    for before, after in pairwise(np.flatnonzero(np.diff(lines) > 1).tolist()):
+        count = after - before - 1
+        shares = _shares(rows[before : after + 1]) if 0 < count <= SOFTEST else None
+        if shares is not None:
+            kept[before + 1 : after] = False
+            places[after] = lines[before + 1] + (1.0 - shares).sum()
+            variances += [_variance(shares)] if count > 1 else []
+    return np.array([*places[kept], lines[-1]]), rows[kept], variances
+
+
+def _shares(rows: Float32Array) -> Float64Array | None:
+    """Of rows [N, Q, C] the shares that those between have of the last, the rest being the first; None for no edge."""
+    first, change = rows[0], rows[-1] - rows[0]
+    shares = ((rows[1:-1] - first) * change).sum(axis=(1, 2)) / (change**2).sum()
+    is_edge = (np.diff(shares, prepend=0.0, append=1.0) > -OFF).all()
+    is_edge = is_edge and alike(rows[1:-1], first + shares[:, None, None] * change, OFF).all()
+    return shares.astype(np.float64) if is_edge else None
+
+
+def _variance(shares: Float64Array) -> float:
+    """That of the places where an edge rises to the shares of so many pixels, and to 1."""
+    rises, places = np.diff(shares, prepend=0.0, append=1.0), np.arange(len(shares) + 1)
+    return float(rises @ (places - rises @ places) ** 2)
+
+
+# --- what lies on what ----------------------------------------------------------------------------------------
+
+
+def _orders(cells: Cells) -> Iterator[list[BoolArray]]:
+    """Ways in which a picture may be laid: cells [R, Q] of one colour each, the lowest first, but for the ground."""
+    depths, sizes = cells.depths, cells.sizes
+    parts = [
+        (depth, (depths == depth) & (cells.which == color))
+        for depth in range(1, depths.max() + 1)
+        for color in np.unique(cells.which[depths == depth])
+    ]
+    for sign in (-1.0, 1.0):
+        yield [part for _, part in sorted(parts, key=lambda each: (each[0], sign * sizes[each[1]].sum()))]
+    whole = [(depths > 0) & (cells.which == color) for color in range(len(cells.colors))]
+    yield sorted(filter(np.any, whole), key=lambda part: -sizes[part].sum())
+
+
+def _laid(cells: Cells, order: Sequence[BoolArray]) -> list[tuple[Tile, Tile, int]]:
+    """Rectangles that show a picture, the lowest first: what they may be, what is seen of them, their colours."""
+    found: list[tuple[Tile, Tile, int]] = []
+    free = np.logical_or.reduce(order) if order else np.zeros_like(cells.which, bool)
+    for part in order:
+        color = int(cells.which[part][0])
+        found += [(tile, _shrunk(tile, part), color) for tile in covered(part, free)]
+        free = free & ~part
+    return found
+
+
+# --- rectangles -----------------------------------------------------------------------------------------------
+
+
+def covered(part: BoolArray, free: BoolArray) -> list[Tile]:
+    """Few rectangles that cover a part of all cells [R, Q], within the free ones: each covers most of what is left."""
+    tiles = np.array([tile for tile in _maximal(free) if part[_within(tile)].any()])
+    left, chosen = part.copy(), list[Tile]()
+    while left.any():
+        best = Tile(*tiles[np.argmax(_sums(left, tiles))].tolist())
+        left[_within(best)] = False
+        chosen.append(best)
+    return _without_needless(chosen, part)
+
+
+def _maximal(free: BoolArray) -> Iterator[Tile]:
+    """All rectangles of free cells that no other has in it."""
+    rows = len(free)
+    for top in range(rows):
+        whole = np.ones(free.shape[1], bool)
+        for bottom in range(top + 1, rows + 1):
+            whole = whole & free[bottom - 1]
+            if not whole.any():
+                break
+            ends = np.flatnonzero(np.diff(whole, prepend=False, append=False))
+            for left, right in ends.reshape(-1, 2):
+                rises = top > 0 and free[top - 1, left:right].all()
+                falls = bottom < rows and free[bottom, left:right].all()
+                if not rises and not falls:
+                    yield Tile(top, bottom, int(left), int(right))
+
+
+def _sums(cells: BoolArray, tiles: IntArray) -> IntArray:
+    """How many cells each of some rectangles [N, 4] has."""
+    table: IntArray = np.pad(cells.cumsum(0).cumsum(1), ((1, 0), (1, 0)))
+    top, bottom, left, right = tiles.T
+    found: IntArray = table[bottom, right] - table[top, right] - table[bottom, left] + table[top, left]
+    return found
+
+
+def _without_needless(tiles: list[Tile], part: BoolArray) -> list[Tile]:
+    """Those without which something is not covered."""
+    times = np.zeros(part.shape, int)
+    for tile in tiles:
+        times[_within(tile)] += 1
+    kept = []
+    for tile in tiles:
+        own = _within(tile)
+        if (times[own][part[own]] > 1).all():
+            times[own] -= 1
+        else:
+            kept.append(tile)
+    return kept
+
+
+def _shrunk(tile: Tile, part: BoolArray) -> Tile:
+    """The least rectangle with all that one has of a part."""
+    rows, columns = np.nonzero(part[_within(tile)])
+    top, left = tile.top + int(rows.min()), tile.left + int(columns.min())
+    return Tile(top, tile.top + int(rows.max()) + 1, left, tile.left + int(columns.max()) + 1)
+
+
+def _within(tile: Tile) -> tuple[slice, slice]:
+    """Where a rectangle's cells are."""
+    return slice(tile.top, tile.bottom), slice(tile.left, tile.right)
+
+
+# --- the scene ------------------------------------------------------------------------------------------------
+
+
+def _scene(cells: Cells, tiles: Sequence[tuple[Tile, Tile, int]]) -> Scene:
+    """Boxes in the places of rectangles."""
+    width, height = (int(places[-1]) for places in (cells.across, cells.down))
+    ground = cells.ground
+    bare = Scene(width, height, (), None if ground is None else cells.color(ground))
+    return replace(bare, layers=tuple(_box(cells, *each, bare.pixel) for each in tiles))
+
+
+def _box(cells: Cells, whole: Tile, seen: Tile, color: int, pixel: float) -> Layer:
+    """A hidden edge is half way between where it may be and what is seen: away from the edges of what hides it."""
+    sides = zip((cells.across, cells.down), _ends(cells, whole), _ends(cells, seen), strict=True)
+    (left, right), (top, bottom) = (
+        ((_hidden(*ends) - 0.5 * places[-1]) * pixel).tolist() for places, *ends in sides
+    )
+    half = 0.5 * (right - left), 0.5 * (bottom - top)
+    falloff = min(cells.deviation / EDGE_DEVIATION * pixel, SOFT * min(half))
+    sizes = (each - 0.5 * falloff for each in half)
+    numbers = (0.5 * (left + right), 0.5 * (top + bottom), *sizes, 0.0, 0.0)
+    return Layer((Shape(KIND, numbers, cells.color(color)),), falloff, 1.0)
+
+
+def _ends(cells: Cells, tile: Tile) -> tuple[Float64Array, Float64Array]:
+    """Where a rectangle begins and ends along x and y, in pixels."""
+    return cells.across[[tile.left, tile.right]], cells.down[[tile.top, tile.bottom]]
+
+
+def _hidden(whole: Float64Array, seen: Float64Array) -> Float64Array:
+    """Edges between two places each, on a whole pixel where these are not one."""
+    return np.where(whole == seen, seen, np.round(0.5 * (whole + seen)))
