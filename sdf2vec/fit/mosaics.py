@@ -27,6 +27,9 @@ CORNERS = 4  # that a box adds to a picture, at most
 OFF = 8.0 / 255  # by which pixels of an edge are off at most, where others cross it
 SOFTEST = 6  # pixels of an edge between cells, at most
 SOFT = 0.9  # of half a box, its falloff, at most
+SPECK = 4  # pixels of a picture that may be enlarged, that are one of it
+SPECKLED = 0.25  # of the colours
+OF_COLORS = 1.8  # boxes for each colour, at least: of gradients there are as many colours as boxes
 OF_CELLS, FEW = 0.5, 4  # boxes for each cell, at most, but always so many: gradients take one for each
 
 
@@ -68,6 +71,14 @@ class Cells(NamedTuple):
     def is_solid(self) -> bool:
         """Whether all colours are opaque, or none at all."""
         return self.colors.shape[1] == 3 or bool(np.isin(self.colors[:, 3], (0.0, 1.0)).all())
+
+    @property
+    def is_antialiased(self) -> bool:
+        """Whether many colours are but of single pixels that are apart, as they are along slopes and curves."""
+        parts, largest = _parts(self.which), np.zeros(len(self.colors))
+        np.maximum.at(largest, self.which, np.bincount(parts.ravel(), self.sizes.ravel())[parts])
+        single = largest <= min(self.sizes.min(), SPECK)
+        return int(single.sum()) > max(SPECKLED * len(single), FEW)
 
     @property
     def is_soft(self) -> bool:
@@ -131,11 +142,12 @@ def mosaic(pixels: Float32Array, most: int, limit: float = 0.0) -> Scene | None:
     `limit`: by how much pixels of one colour may differ.
     """
     cells = Cells.of(pixels, limit)
-    if cells is None or cells.fewest > most or cells.is_soft or not cells.is_solid:
+    if cells is None or cells.fewest > most or not cells.is_solid or cells.is_soft or cells.is_antialiased:
         return None
     most = min(most, max(int(OF_CELLS * cells.which.size), FEW))
     found = min((_laid(cells, order) for order in _orders(cells)), key=len)
-    return _scene(cells, found) if len(found) <= most else None
+    enough = max(OF_COLORS * (len(cells.colors) - 1), FEW)
+    return _scene(cells, found) if len(found) <= most and not FEW < len(found) < enough else None
 
 
 def _parts(which: IntArray) -> IntArray:
@@ -193,6 +205,8 @@ def _between_edges(lines: IntArray, rows: Float32Array) -> tuple[Float64Array, F
 def _shares(rows: Float32Array) -> Float64Array | None:
     """Of rows [N, Q, C] the shares that those between have of the last, the rest being the first; None for no edge."""
     first, change = rows[0], rows[-1] - rows[0]
+    if not change.any():
+        return None
     shares = ((rows[1:-1] - first) * change).sum(axis=(1, 2)) / (change**2).sum()
     is_edge = (np.diff(shares, prepend=0.0, append=1.0) > -OFF).all()
     is_edge = is_edge and alike(rows[1:-1], first + shares[:, None, None] * change, OFF).all()
