@@ -143,7 +143,7 @@ def _is_as_good(scene: Scene, boxes: Scene, drawn: Drawn) -> bool:
 
 
 def _explained(drawn: Drawn, settings: Settings, callback: Callback) -> Fitted | None:
-    """The same by what shapes of any kind a drawing is made of."""
+    """The scene of a drawing in shapes of any kind; None where it is to be painted."""
     shading = None if drawn.flat else Shading.of(drawn.pixels, FLAT)
     if shading is None:
         if not _is_searched(drawn, settings):

@@ -22,7 +22,8 @@ from ..scene import Color, Layer, Scene, Shape
 from .jagged import alike
 
 KIND = "box"
-LINES = 128  # along a side, at most, on which anything changes
+LINES = 256  # along a side, at most, on which anything changes
+LOOKED_AT = 16  # rows of pixels, about, that tell most pictures from these
 CORNERS = 4  # that a box adds to a picture, at most
 OFF = 8.0 / 255  # by which pixels of an edge are off at most, where others cross it
 SOFTEST = 6  # pixels of an edge between cells, at most
@@ -48,15 +49,18 @@ class Cells(NamedTuple):
     @classmethod
     def of(cls, pixels: Float32Array, limit: float) -> Cells | None:
         """Those of a picture [H, W, C], that changes where pixels differ by more than a limit; None of too many."""
-        down, across = _lines(pixels, limit), _lines(np.swapaxes(pixels, 0, 1), limit)
+        turned = np.swapaxes(pixels, 0, 1)
+        if len(_lines(turned[:, :: 1 + len(pixels) // LOOKED_AT], limit)) > LINES + 1:  # as of any photograph
+            return None
+        down, across = _lines(pixels, limit), _lines(turned, limit)
         if max(len(down), len(across)) > LINES + 1:
             return None
         cells = pixels[down[:-1]][:, across[:-1]]
         if not alike(pixels, cells.repeat(np.diff(down), 0).repeat(np.diff(across), 1), limit).all():
             return None
         places_down, cells, softness = _between_edges(down, cells)
-        places_across, turned, more = _between_edges(across, np.swapaxes(cells, 0, 1))
-        colors, which = _told_apart(np.swapaxes(turned, 0, 1), limit)
+        places_across, columns, more = _between_edges(across, np.swapaxes(cells, 0, 1))
+        colors, which = _told_apart(np.swapaxes(columns, 0, 1), limit)
         deviation = math.sqrt(np.mean([*softness, *more])) if softness or more else 0.0
         return cls(places_across, places_down, colors, which, deviation)
 
@@ -145,9 +149,12 @@ def mosaic(pixels: Float32Array, most: int, limit: float = 0.0) -> Scene | None:
     if cells is None or cells.fewest > most or not cells.is_solid or cells.is_soft or cells.is_antialiased:
         return None
     most = min(most, max(int(OF_CELLS * cells.which.size), FEW))
-    found = min((_laid(cells, order) for order in _orders(cells)), key=len)
-    enough = max(OF_COLORS * (len(cells.colors) - 1), FEW)
-    return _scene(cells, found) if len(found) <= most and not FEW < len(found) < enough else None
+    best = None
+    for order in _orders(cells):
+        if (found := _laid(cells, order, most)) is not None:
+            best, most = found, len(found) - 1
+    enough = OF_COLORS * (len(cells.colors) - 1)
+    return None if best is None or FEW < len(best) < enough else _scene(cells, best)
 
 
 def _parts(which: IntArray) -> IntArray:
@@ -236,13 +243,18 @@ def _orders(cells: Cells) -> Iterator[list[BoolArray]]:
     yield sorted(filter(np.any, whole), key=lambda part: -sizes[part].sum())
 
 
-def _laid(cells: Cells, order: Sequence[BoolArray]) -> list[tuple[Tile, Tile, int]]:
-    """Rectangles that show a picture, the lowest first: what they may be, what is seen of them, their colours."""
+def _laid(cells: Cells, order: Sequence[BoolArray], most: int) -> list[tuple[Tile, Tile, int]] | None:
+    """Rectangles that show a picture, the lowest first: what they may be, what is seen of them, their colours.
+
+    None where they are more than so many.
+    """
     found: list[tuple[Tile, Tile, int]] = []
     free = np.logical_or.reduce(order) if order else np.zeros_like(cells.which, bool)
     for part in order:
         color = int(cells.which[part][0])
         found += [(tile, _shrunk(tile, part), color) for tile in covered(part, free)]
+        if len(found) > most:
+            return None
         free = free & ~part
     return found
 
@@ -252,7 +264,7 @@ def _laid(cells: Cells, order: Sequence[BoolArray]) -> list[tuple[Tile, Tile, in
 
 def covered(part: BoolArray, free: BoolArray) -> list[Tile]:
     """Few rectangles that cover a part of all cells [R, Q], within the free ones: each covers most of what is left."""
-    tiles = np.array([tile for tile in _maximal(free) if part[_within(tile)].any()])
+    tiles = _maximal(free)
     left, chosen = part.copy(), list[Tile]()
     while left.any():
         best = Tile(*tiles[np.argmax(_sums(left, tiles))].tolist())
@@ -261,21 +273,33 @@ def covered(part: BoolArray, free: BoolArray) -> list[Tile]:
     return _without_needless(chosen, part)
 
 
-def _maximal(free: BoolArray) -> Iterator[Tile]:
-    """All rectangles of free cells that no other has in it."""
-    rows = len(free)
-    for top in range(rows):
-        whole = np.ones(free.shape[1], bool)
-        for bottom in range(top + 1, rows + 1):
-            whole = whole & free[bottom - 1]
-            if not whole.any():
+def _maximal(free: BoolArray) -> IntArray:
+    """All rectangles of free cells that no other has in it, [N, 4]."""
+    bits = [0, *(int.from_bytes(row.tobytes(), "little") for row in np.packbits(free, 1, "little")), 0]
+    found = list[Tile]()
+    for top in range(1, len(bits) - 1):
+        whole = bits[top]
+        for bottom in range(top + 1, len(bits)):
+            if not whole & ~bits[top - 1]:  # all of it goes on above
                 break
-            ends = np.flatnonzero(np.diff(whole, prepend=False, append=False))
-            for left, right in ends.reshape(-1, 2):
-                rises = top > 0 and free[top - 1, left:right].all()
-                falls = bottom < rows and free[bottom, left:right].all()
-                if not rises and not falls:
-                    yield Tile(top, bottom, int(left), int(right))
+            if whole & ~bits[bottom]:
+                found += [
+                    Tile(top - 1, bottom - 1, left, right)
+                    for left, right, run in _runs(whole)
+                    if run & ~bits[top - 1] and run & ~bits[bottom]
+                ]
+            whole &= bits[bottom]
+    return np.array(found)
+
+
+def _runs(bits: int) -> Iterator[tuple[int, int, int]]:
+    """Where runs of ones in a number begin and end, from the lowest on, and these ones alone."""
+    while bits:
+        lowest = bits & -bits
+        after = ((bits + lowest) ^ bits) & (bits + lowest)
+        run = after - lowest
+        yield lowest.bit_length() - 1, after.bit_length() - 1, run
+        bits ^= run
 
 
 def _sums(cells: BoolArray, tiles: IntArray) -> IntArray:

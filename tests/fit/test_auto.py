@@ -468,6 +468,21 @@ def test_what_is_far_from_a_drawing_tries_all_numbers(found, off, tried, wanted,
     assert enough.shape_count == wanted
 
 
+def test_what_does_not_show_a_drawing_gives_way_to_what_does(monkeypatch):
+    """Also where its description is the shortest, as of a plot of thin curves on white."""
+    levels = {2: 0.4, 4: 0.42, 8: 0.46, 24: 0.47, 48: 0.48}
+    monkeypatch.setattr(auto, "description_length", lambda scene, view: 100.0 + scene.layer_count)
+    monkeypatch.setattr(
+        auto,
+        "fit_concisely",
+        lambda picture, settings, callback: hidden(settings.shapes, levels[settings.shapes]),
+    )
+    picture = Picture(np.full((64, 64, 3), 0.5, np.float32))
+    view = View(torch.from_numpy(picture.pixels).permute(2, 0, 1), None)
+    enough = auto._enough(picture, settings_of(max_shapes=48), hidden(2, 0.4), view, lambda progress: False)
+    assert enough.shape_count == 8
+
+
 @pytest.mark.parametrize("size", [(160, 120), (136, 136), (180, 100)])
 def test_what_is_hardly_larger_than_it_is_looked_at_is_not_scaled(size):
     """Scaled by so little, edges were softer than any of a shape: a ring took two layers and half a minute."""

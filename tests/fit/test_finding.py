@@ -60,3 +60,15 @@ def test_a_search_that_would_not_find_the_drawing_ends(outlined, gains, made, mo
     monkeypatch.setattr(Drawing, "_finish", lambda self: None)
     Drawing(replace(Drawn.of(noise()), flat=True), settings_of(), lambda progress: False).found()
     assert len(list(rounds)) == len(gains) - made
+
+
+@pytest.mark.parametrize(
+    ("error", "bits", "is_told"), [(1e-4, 3.0, True), (1e-4, 4.0, False), (1e-5, 9.0, True)]
+)
+def test_what_is_near_but_leaves_much_to_be_told_is_not_the_drawing(error, bits, is_told, monkeypatch):
+    """As of a soft photograph; what is nearer than anyone sees is, whatever is left."""
+    drawing = Drawing(Drawn.of(noise()), settings_of(), lambda progress: False)
+    values = drawing.sizes.last.target.numel()
+    monkeypatch.setattr(finding, "description_length", lambda scene, view: bits * values)
+    drawing.error = error
+    assert drawing.explains(hidden(2, 0.5)) == is_told
