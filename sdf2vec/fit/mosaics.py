@@ -263,14 +263,31 @@ def _laid(cells: Cells, order: Sequence[BoolArray], most: int) -> list[tuple[Til
 
 
 def covered(part: BoolArray, free: BoolArray) -> list[Tile]:
-    """Few rectangles that cover a part of all cells [R, Q], within the free ones: each covers most of what is left."""
-    tiles = _maximal(free)
-    left, chosen = part.copy(), list[Tile]()
+    """Few rectangles that cover a part of all cells [R, Q], within the free ones: each covers most of what is left.
+
+    Where cells of the part meet one covers all of them: between two that only touch, a line is seen at other sizes.
+    """
+    tiles, whole = _maximal(free), _with_seams(part)
+    seams = 2 * tiles - np.array(
+        [0, 1, 0, 1]
+    )  # the same in rows and columns of cells and of what is between them
+    left, chosen = whole.copy(), list[int]()
     while left.any():
-        best = Tile(*tiles[np.argmax(_sums(left, tiles))].tolist())
-        left[_within(best)] = False
+        best = int(np.argmax(_sums(left, seams)))
+        left[_within(Tile(*seams[best].tolist()))] = False
         chosen.append(best)
-    return _without_needless(chosen, part)
+    kept = _needed([Tile(*seams[index].tolist()) for index in chosen], whole)
+    return [Tile(*tiles[chosen[index]].tolist()) for index in kept]
+
+
+def _with_seams(part: BoolArray) -> BoolArray:
+    """Cells [R, Q] and, between them, where two or four of them meet, [2R - 1, 2Q - 1]."""
+    rows, columns = part.shape
+    found = np.zeros((2 * rows - 1, 2 * columns - 1), bool)
+    found[::2, ::2] = part
+    found[1::2, ::2] = part[1:] & part[:-1]
+    found[:, 1::2] = found[:, 2::2] & found[:, :-1:2]
+    return found
 
 
 def _maximal(free: BoolArray) -> IntArray:
@@ -310,18 +327,16 @@ def _sums(cells: BoolArray, tiles: IntArray) -> IntArray:
     return found
 
 
-def _without_needless(tiles: list[Tile], part: BoolArray) -> list[Tile]:
-    """Those without which something is not covered."""
-    times = np.zeros(part.shape, int)
+def _needed(tiles: Sequence[Tile], part: BoolArray) -> list[int]:
+    """Which of some rectangles cover something of a part that no others do."""
+    times, kept = np.zeros(part.shape, int), []
     for tile in tiles:
         times[_within(tile)] += 1
-    kept = []
-    for tile in tiles:
-        own = _within(tile)
+    for index, own in enumerate(map(_within, tiles)):
         if (times[own][part[own]] > 1).all():
             times[own] -= 1
         else:
-            kept.append(tile)
+            kept.append(index)
     return kept
 
 

@@ -64,6 +64,19 @@ def boxes_at(pixels, scene):
     return found
 
 
+def pairs_in(tiles, part=None):
+    """Cells, and all that meet, two or four, which one of some rectangles covers."""
+    return {
+        (row, column, rows, columns)
+        for top, bottom, left, right in tiles
+        for rows in (1, 2)
+        for columns in (1, 2)
+        for row in range(top, bottom - rows + 1)
+        for column in range(left, right - columns + 1)
+        if part is None or part[row : row + rows, column : column + columns].all()
+    }
+
+
 @pytest.mark.parametrize("times", [1, 3, 8])
 @pytest.mark.parametrize("cells", [code(9), code(21), sprite()], ids=["code", "larger code", "sprite"])
 def test_boxes_show_every_pixel(cells, times):
@@ -170,20 +183,20 @@ def test_no_more_boxes_than_are_allowed():
     assert mosaic(pixels, count - 1) is None
 
 
-def test_rectangles_that_others_make_needless_are_left_out():
-    """The largest, in the middle, comes first: four others cover all of it that nothing else does."""
+def test_cells_that_meet_are_covered_by_one_rectangle():
+    """Two or four: between boxes of one colour that only touch, a line or a point is seen at other sizes."""
+    part = np.random.default_rng(5).random((24, 20)) > 0.35
+    assert pairs_in(covered(part, part)) == pairs_in([(0, 24, 0, 20)], part)
+
+
+def test_every_rectangle_is_needed():
+    """The largest, in the middle, comes first: those around it cover all of it that nothing else does."""
     part = np.zeros((7, 7), bool)
     part[2:5, 2:5] = part[1:4, 0:3] = part[3:6, 4:7] = part[4:7, 1:4] = part[0:3, 3:6] = True
     tiles = covered(part, part)
-    shown = np.zeros_like(part)
-    for top, bottom, left, right in tiles:
-        shown[top:bottom, left:right] = True
-    assert (shown == part).all()
+    assert pairs_in(tiles) == pairs_in([(0, 7, 0, 7)], part)
     for index in range(len(tiles)):
-        rest = np.zeros_like(part)
-        for top, bottom, left, right in tiles[:index] + tiles[index + 1 :]:
-            rest[top:bottom, left:right] = True
-        assert (rest != part).any()
+        assert pairs_in(tiles[:index] + tiles[index + 1 :]) != pairs_in(tiles)
 
 
 def test_an_svg_of_pixel_art_is_the_picture():
