@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import time
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
@@ -42,6 +43,7 @@ is_lettering: Callable[[Any], bool] = deferred("sdf2vec.lettering", "is_letterin
 HINT = "this looks like text: outlines serve it better (vtracer, potrace)"
 quality_of: Callable[[Scene, Picture], Quality] = deferred("sdf2vec.quality", "quality")
 figure: Callable[..., Check | None] = deferred("sdf2vec.roundtrip", "figure")
+EXACT = 80.0  # dB from the picture of what shows it pixel by pixel
 
 
 @dataclass(frozen=True)
@@ -208,7 +210,7 @@ def write_exports(
         written, met = written + len(made.raw), met and made.met
         if path != STREAM:
             with teller.phase(f"check {target}"):
-                near = _figure(scene, target, made, chosen) if teller.running.check == "auto" else ""
+                near = _figure(scene, target, made, chosen, picture) if teller.running.check == "auto" else ""
             teller.say(f"  {path}: {len(made.raw):,} bytes{_packed(target, made.raw)}{near}")
             written += _write_beside(path, EXPORTERS[target].suffix, made.beside, teller)
         for note in made.notes:
@@ -237,13 +239,18 @@ def _write(path: str, data: bytes) -> None:
         write_atomically(path, data)
 
 
-def _figure(scene: Scene, target: str, made: Exported, options: Options) -> str:
-    """How near the export comes to the render, where an engine can tell; at the fitted size."""
+def _figure(scene: Scene, target: str, made: Exported, options: Options, picture: Picture | None) -> str:
+    """How near the export comes to the render and the picture, where an engine can tell; at the fitted size."""
     try:
-        result = figure(scene, target, made, options)
+        result = figure(scene, target, made, options, picture)
     except Sdf2vecError as error:
         return f"; not checked: {one_line(str(error))}"
     if result is None:
         return ""
     worst = f"{result.largest_error:.0f}" if result.largest_error >= 10 else f"{result.largest_error:.2g}"
-    return f"; {result.engine} draws it at {result.psnr:.1f} dB, largest error {worst} levels"
+    drawn = f"; {result.engine} draws it at {result.psnr:.1f} dB, largest error {worst} levels"
+    return drawn if math.isnan(result.near) else f"{drawn}, {_near(result.near)}"
+
+
+def _near(decibels: float) -> str:
+    return "exactly the picture" if decibels >= EXACT else f"{decibels:.1f} dB from the picture"

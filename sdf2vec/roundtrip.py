@@ -14,14 +14,14 @@ from urllib.parse import unquote_to_bytes
 import numpy as np
 import torch
 
-from .arrays import Float32Array
+from .arrays import Float32Array, Float64Array
 from .engines import ENGINES
 from .errors import Sdf2vecError
 from .export.exported import Exported
 from .export.options import SVG_PROFILES, Options
 from .export.table_text import DATA_WIDTH
 from .exports import Exports
-from .image import fitted_size, premultiply
+from .image import Picture, fitted_size, premultiply
 from .metrics import psnr
 from .render.draw import draw, draw_fast, is_large
 from .render.reference import render
@@ -49,6 +49,7 @@ class Check:
 
     Errors are in 8-bit levels over all pixels and RGBA; `mean_error` is signed. `limit` is what a drawing of so few
     pixels can show, in dB: how near the render, whose edges are soft by a pixel, comes to what covers each pixel.
+    `near`: how near the export is to the picture that was fitted, in dB, where that is known and of this size.
     """
 
     target: str
@@ -60,6 +61,7 @@ class Check:
     mean_error: float = math.nan
     missing: str = ""
     limit: float = math.inf
+    near: float = math.nan
 
     @property
     def verdict(self) -> str:
@@ -199,7 +201,9 @@ def _limit(scene: Scene, width: int, height: int) -> float:
     return float(psnr(means, _expected(scene, width, height).float()))
 
 
-def figure(scene: Scene, target: str, made: Exported, options: Options) -> Check | None:
+def figure(
+    scene: Scene, target: str, made: Exported, options: Options, picture: Picture | None = None
+) -> Check | None:
     """An export at the fitted size (a shader of many shapes: smaller) on the first quick engine; None where none is.
 
     None too for one that shows something else than the render: a moving picture, or a part of it.
@@ -212,29 +216,46 @@ def figure(scene: Scene, target: str, made: Exported, options: Options) -> Check
             size = default_sizes(scene, trip)[0]
             if trip.profile is None:
                 size = _within(QUICK_WORK / max(1, scene.shape_count), *size)
-            return compare(trip, made, scene, size, draw_fast(scene, *size))
+            return compare(trip, made, scene, size, draw_fast(scene, *size), picture)
     return None
 
 
 def compare(
-    trip: RoundTrip, made: Exported, scene: Scene, size: Size, expected: torch.Tensor | None = None
+    trip: RoundTrip,
+    made: Exported,
+    scene: Scene,
+    size: Size,
+    expected: torch.Tensor | None = None,
+    picture: Picture | None = None,
 ) -> Check:
-    """One export drawn at one size, against a render [4, H, W], by default `_expected`."""
+    """One export drawn at one size, against a render [4, H, W], by default `_expected`, and the picture."""
     width, height = size
     drawn = trip.draw(made, scene, width, height)
     if expected is None:
         expected = _expected(scene, width, height)
     difference = 255.0 * (drawn.astype(np.float64) - expected.permute(1, 2, 0).double().numpy())
-    error = float(np.mean(difference**2))
     return Check(
         trip.name,
         ENGINES[trip.engine].name,
         width,
         height,
-        psnr=10.0 * math.log10(255.0**2 / error) if error > 0 else math.inf,
+        psnr=_decibels(difference / 255.0),
         largest_error=float(np.abs(difference).max()),
         mean_error=float(difference.mean()),
+        near=_near(drawn, picture) if picture and size == (picture.width, picture.height) else math.nan,
     )
+
+
+def _near(drawn: Pixels, picture: Picture) -> float:
+    """How near a drawing is to a picture, both premultiplied, in dB."""
+    target = picture.premultiplied
+    return _decibels(drawn[..., : target.shape[2]].astype(np.float64) - target)
+
+
+def _decibels(difference: Float64Array) -> float:
+    """The PSNR of what is off, of a scale from 0 to 1."""
+    error = float(np.mean(difference**2))
+    return -10.0 * math.log10(error) if error > 0 else math.inf
 
 
 # --- drawing -----------------------------------------------------------------------------------------------

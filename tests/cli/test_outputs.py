@@ -3,6 +3,7 @@
 import base64
 import io
 import json
+import math
 import os
 import re
 import time
@@ -14,6 +15,7 @@ from PIL import Image
 
 import sdf2vec
 from sdf2vec import quality
+from sdf2vec.engines import resvg
 from sdf2vec.fit import loop
 from sdf2vec.roundtrip import Check
 from tests.cli.command import ALL, OUTPUTS, SHORT, as_png, names, picture
@@ -75,6 +77,21 @@ def test_the_summary_says_how_an_engine_draws_it(folder, run, require_engine):
     assert figure
     assert float(figure[1]) > 80
     assert float(figure[2]) <= 0.25
+
+
+def test_the_summary_says_how_near_the_picture_a_drawing_is(folder, run, require_engine):
+    """Pixel art is told exactly; how near another comes is measured here once more."""
+    require_engine("resvg")
+    pixels = np.kron(np.random.default_rng(1).random((9, 9, 1)) > 0.5, np.ones((4, 4, 3), bool))
+    Image.fromarray(255 * pixels.astype(np.uint8)).save(folder / "code.png")
+    assert "levels, exactly the picture" in run("code.png", "--emit", "svg").out.decode()
+    out = run("photo.jpg", *SHORT, "--emit", "svg").out.decode()
+    (said,) = re.findall(r"levels, ([\d.]+) dB from the picture", out)
+    photo = np.asarray(Image.open(folder / "photo.jpg").convert("RGB")) / 255
+    drawn = np.asarray(resvg.render((folder / "photo.svg").read_text(), photo.shape[1], photo.shape[0]))[
+        ..., :3
+    ]
+    assert float(said) == pytest.approx(-10 * math.log10(np.mean((drawn - photo) ** 2)), abs=0.06)
 
 
 def test_the_options_of_a_fit(folder, run, monkeypatch):
