@@ -256,7 +256,9 @@ def test_a_shader_of_many_shapes_is_drawn_smaller_after_its_export(
 ):
     require_engine(engine)
     sizes: list[tuple[int, int]] = []
-    monkeypatch.setattr(roundtrip, "compare", lambda trip, made, scene, size, expected, picture: sizes.append(size))
+    monkeypatch.setattr(
+        roundtrip, "compare", lambda trip, made, scene, size, expected, picture: sizes.append(size)
+    )
     monkeypatch.setattr(roundtrip, "QUICK_WORK", 2e5)
     for layers in (2, 50):
         scene = random_scene(("circle",), layers=layers, width=300, height=200, joins=())
