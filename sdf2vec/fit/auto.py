@@ -114,10 +114,11 @@ def _few(picture: Picture, settings: Settings, callback: Callback) -> Fitted | N
         return None
     drawn = Drawn.of(picture)
     boxes = _mosaic(drawn, settings, callback)
-    if boxes is not None and len(boxes.layers) > SIMPLE and not is_jagged(drawn.pixels):
+    is_sure = boxes is not None and len(boxes.layers) > SIMPLE and not settings.has_target
+    if boxes is not None and is_sure and not is_jagged(drawn.pixels):
         return _told(boxes, picture, settings)
     found = _explained(drawn, settings, callback)
-    if boxes is None or (found is not None and _is_as_good(found.scene, boxes, drawn)):
+    if boxes is None or (found is not None and _is_as_good(found, boxes, drawn, settings)):
         return found
     return _told(boxes, picture, settings)
 
@@ -135,11 +136,16 @@ def _mosaic(drawn: Drawn, settings: Settings, callback: Callback) -> Scene | Non
     return found if is_near else None
 
 
-def _is_as_good(scene: Scene, boxes: Scene, drawn: Drawn) -> bool:
-    """Whether a scene tells a picture, with smooth edges, by no more shapes than there are boxes, and about as well."""
+def _is_as_good(found: Fitted, boxes: Scene, drawn: Drawn, settings: Settings) -> bool:
+    """Whether what was found are no more shapes than there are boxes, and tell the picture, with smooth edges, about as
+    well, or as near as is wanted.
+    """
+    if found.scene.shape_count > boxes.shape_count:
+        return False
+    if settings.has_target:
+        return found.met
     smooth = Picture(unpremultiply(drawn.antialiased.pixels))
-    fewer = scene.shape_count <= boxes.shape_count
-    return fewer and psnr_of(scene, smooth) >= min(psnr_of(boxes, smooth) - NEARLY, NEAR)
+    return psnr_of(found.scene, smooth) >= min(psnr_of(boxes, smooth) - NEARLY, NEAR)
 
 
 def _explained(drawn: Drawn, settings: Settings, callback: Callback) -> Fitted | None:
