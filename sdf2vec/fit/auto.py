@@ -137,10 +137,10 @@ def _mosaic(drawn: Drawn, settings: Settings, callback: Callback) -> Scene | Non
 
 
 def _is_as_good(found: Fitted, boxes: Scene, drawn: Drawn, settings: Settings) -> bool:
-    """Whether what was found are no more shapes than there are boxes, and tell the picture, with smooth edges, about as
-    well, or as near as is wanted.
+    """Whether what was found are fewer shapes than boxes, and tell the picture, with smooth edges, about as well, or as
+    near as is wanted.
     """
-    if found.scene.shape_count > boxes.shape_count:
+    if found.scene.shape_count >= boxes.shape_count:
         return False
     if settings.has_target:
         return found.met

@@ -238,3 +238,11 @@ def test_translucent_boxes_are_no_more_than_they_are():
         pixels[rows, columns] = 0.5 * pixels[rows, columns] + 0.5 * np.array(color, np.float32)
     assert told(pixels).shape_count == 3
     assert fit(Picture(pixels)).shape_count == 2
+
+
+def test_few_boxes_are_kept_where_others_are_as_many():
+    """Edges of four pixels: three discs are as near to them as boxes, whose edges are as soft as a pixel."""
+    pixels = np.array([[[1, 0, 0], [0, 1, 0]], [[0, 0, 1], [1, 1, 0]]], np.float32)
+    found = fit(Picture(pixels))
+    assert found.shape_count == 3
+    assert np.abs(boxes_at(pixels, found) - pixels).max() < 1e-4
