@@ -130,7 +130,10 @@ def _mosaic(drawn: Drawn, settings: Settings, callback: Callback) -> Scene | Non
     found = mosaic(drawn.pixels, settings.most, NOISE if drawn.off else 0.0)
     if found is None or settings.shapes not in (AUTO, len(found.layers)):
         return None
-    if any(layer.falloff for layer in found.layers):
+    softest = max((layer.falloff for layer in found.layers), default=0.0)
+    if softest > preset_of(settings).falloff[1]:
+        return None
+    if softest:
         found = Drawing(drawn, settings, callback).finished(found)
     is_near = not settings.has_target or missed(found, drawn.picture, settings) <= 0
     return found if is_near else None
