@@ -39,8 +39,9 @@ class Grain(NamedTuple):
         share = math.sqrt(min(1.0, max(count, 1) / MANY))
         softnesses = min(self.softnesses, max(self.fewest, round(self.softnesses * share)))
         runs = self.runs if count >= MANY else min(self.runs, 1)
-        units = min(scene.width, scene.height)
-        if not is_of_pixels(scene):
+        if is_of_pixels(scene):
+            units = min(scene.width, scene.height)
+        else:
             about = round(self.units * max(1.0, count / SPARSE) ** self.shrink)
             units = _in_proportion(about, scene.width, scene.height)
         return self._replace(units=units, softnesses=softnesses, filter=self.filter / share, runs=runs)

@@ -14,13 +14,14 @@ from urllib.parse import unquote_to_bytes
 import numpy as np
 import torch
 
-from .arrays import Float32Array, Float64Array
+from .arrays import Float32Array
 from .engines import ENGINES
 from .errors import Sdf2vecError
 from .export.exported import Exported
 from .export.options import SVG_PROFILES, Options
 from .export.table_text import DATA_WIDTH
 from .exports import Exports
+from .fit.views import planes
 from .image import Picture, fitted_size, premultiply
 from .metrics import psnr
 from .render.draw import draw, draw_fast, is_large
@@ -233,14 +234,15 @@ def compare(
     drawn = trip.draw(made, scene, width, height)
     if expected is None:
         expected = _expected(scene, width, height)
-    difference = 255.0 * (drawn.astype(np.float64) - expected.permute(1, 2, 0).double().numpy())
+    shown = planes(drawn).double()
+    difference = 255.0 * (shown - expected)
     return Check(
         trip.name,
         ENGINES[trip.engine].name,
         width,
         height,
-        psnr=_decibels(difference / 255.0),
-        largest_error=float(np.abs(difference).max()),
+        psnr=float(psnr(shown, expected.double())),
+        largest_error=float(difference.abs().max()),
         mean_error=float(difference.mean()),
         near=_near(drawn, picture) if picture and size == (picture.width, picture.height) else math.nan,
     )
@@ -249,13 +251,7 @@ def compare(
 def _near(drawn: Pixels, picture: Picture) -> float:
     """How near a drawing is to a picture, both premultiplied, in dB."""
     target = picture.premultiplied
-    return _decibels(drawn[..., : target.shape[2]].astype(np.float64) - target)
-
-
-def _decibels(difference: Float64Array) -> float:
-    """The PSNR of what is off, of a scale from 0 to 1."""
-    error = float(np.mean(difference**2))
-    return -10.0 * math.log10(error) if error > 0 else math.inf
+    return float(psnr(planes(drawn[..., : target.shape[2]]).double(), planes(target)))
 
 
 # --- drawing -----------------------------------------------------------------------------------------------

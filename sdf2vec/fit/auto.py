@@ -114,12 +114,12 @@ def _few(picture: Picture, settings: Settings, callback: Callback) -> Fitted | N
         return None
     drawn = Drawn.of(picture)
     boxes = _mosaic(drawn, settings, callback)
-    is_sure = boxes is not None and len(boxes.layers) > SIMPLE and not settings.has_target
-    if boxes is not None and is_sure and not is_jagged(drawn.pixels):
-        return _told(boxes, picture, settings)
-    found = _explained(drawn, settings, callback)
-    if boxes is None or (found is not None and _is_as_good(found, boxes, drawn, settings)):
-        return found
+    if boxes is None:
+        return _explained(drawn, settings, callback)
+    if settings.has_target or len(boxes.layers) <= SIMPLE or is_jagged(drawn.pixels):
+        found = _explained(drawn, settings, callback)
+        if found is not None and _is_as_good(found, boxes, drawn, settings):
+            return found
     return _told(boxes, picture, settings)
 
 

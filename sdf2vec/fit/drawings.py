@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 import torch
@@ -60,7 +61,7 @@ class Drawn:
         quick = self.picture.width * self.picture.height <= QUICK**2
         return self._is_fine and (quick or _small_flatness(self.pixels) >= UNCLEAN)
 
-    @property
+    @cached_property
     def antialiased(self) -> Drawn:
         """The same with smooth edges."""
         if self._is_fine and is_jagged(self.pixels):

@@ -8,16 +8,18 @@ cover takes (Chvátal 1979) of all that are maximal.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
-from dataclasses import replace
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
 from itertools import pairwise
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from scipy import ndimage
 
 from ..arrays import BoolArray, Float32Array, Float64Array, IntArray
 from ..blend import EDGE_DEVIATION
+from ..deferred import deferred
 from ..scene import Color, Layer, Scene, Shape
 from .jagged import alike
 
@@ -33,8 +35,11 @@ SPECKLED = 0.25  # of the colours
 OF_COLORS = 1.8  # boxes for each colour, at least: of gradients there are as many colours as boxes
 OF_CELLS, FEW = 0.5, 4  # boxes for each cell, at most, but always so many: gradients take one for each
 
+label: Callable[..., Any] = deferred("skimage.measure", "label")
 
-class Cells(NamedTuple):
+
+@dataclass(frozen=True, eq=False)
+class Cells:
     """A picture's cells [R, Q]: places of the lines between them in pixels, with both ends; colours [K, C], and which.
 
     `deviation`: the standard deviation of their edges in pixels, 0 for sharp ones.
@@ -48,7 +53,7 @@ class Cells(NamedTuple):
 
     @classmethod
     def of(cls, pixels: Float32Array, limit: float) -> Cells | None:
-        """Those of a picture [H, W, C], that changes where pixels differ by more than a limit; None of too many."""
+        """Those of a picture [H, W, C], which changes where pixels differ by more than a limit; None of too many."""
         turned = np.swapaxes(pixels, 0, 1)
         if len(_lines(turned[:, :: 1 + len(pixels) // LOOKED_AT], limit)) > LINES + 1:  # as of any photograph
             return None
@@ -74,13 +79,13 @@ class Cells(NamedTuple):
     @property
     def is_solid(self) -> bool:
         """Whether all colours are opaque, or none at all."""
-        return self.colors.shape[1] == 3 or bool(np.isin(self.colors[:, 3], (0.0, 1.0)).all())
+        return bool(np.isin(self._alphas, (0.0, 1.0)).all())
 
     @property
     def is_antialiased(self) -> bool:
         """Whether many colours are but of single pixels that are apart, as they are along slopes and curves."""
-        parts, largest = _parts(self.which), np.zeros(len(self.colors))
-        np.maximum.at(largest, self.which, np.bincount(parts.ravel(), self.sizes.ravel())[parts])
+        largest = np.zeros(len(self.colors))
+        np.maximum.at(largest, self.which, np.bincount(self._parts.ravel(), self.sizes.ravel())[self._parts])
         single = largest <= min(self.sizes.min(), SPECK)
         return int(single.sum()) > max(SPECKLED * len(single), FEW)
 
@@ -97,38 +102,48 @@ class Cells(NamedTuple):
         red, green, blue = self.colors[number, :3].tolist()
         return red, green, blue
 
-    @property
+    @cached_property
     def sizes(self) -> Float64Array:
         """How many pixels each cell has, [R, Q]."""
-        return np.outer(np.diff(self.down), np.diff(self.across)).astype(np.float64)
+        return np.outer(np.diff(self.down), np.diff(self.across))
 
-    @property
-    def clear(self) -> BoolArray:
-        """Which cells are transparent, [R, Q]."""
-        alpha = self.colors[:, 3] if self.colors.shape[1] == 4 else np.ones(len(self.colors))
-        return np.asarray(alpha[self.which] == 0.0)
-
-    @property
+    @cached_property
     def ground(self) -> int | None:
         """The number of the colour that most of the rim has; none where anything is transparent."""
-        if self.clear.any():
+        if not self._alphas.all():
             return None
-        rim = np.pad(np.zeros(np.maximum(np.array(self.which.shape) - 2, 0), bool), 1, constant_values=True)
-        rim = rim[: self.which.shape[0], : self.which.shape[1]]
-        areas = np.bincount(self.which[rim], self.sizes[rim])
-        return int(areas.argmax())
+        return int(np.bincount(self.which[self._rim], self.sizes[self._rim]).argmax())
 
     @property
     def depths(self) -> IntArray:
         """How many edges are between each cell and the ground, or what is transparent, [R, Q]: there it is 0."""
-        ground = self.ground
-        on_ground = self.clear if ground is None else _at_rim(self.which == ground)
+        if self.ground is None:
+            on_ground = self._alphas[self.which] == 0.0
+        else:
+            on_ground = np.isin(self._parts, self._parts[self._rim & (self.which == self.ground)])
         depths = np.where(on_ground, 0, -1)
-        parts = _parts(self.which)
         while (depths < 0).any():
             reached = ndimage.binary_dilation(depths >= 0) & (depths < 0)
-            depths[np.isin(parts, parts[reached]) & (depths < 0)] = depths.max() + 1
+            depths[np.isin(self._parts, self._parts[reached])] = depths.max() + 1
         return depths
+
+    @property
+    def _alphas(self) -> Float32Array:
+        """That of each colour, [K]."""
+        return self.colors[:, 3] if self.colors.shape[1] == 4 else np.ones(len(self.colors), np.float32)
+
+    @cached_property
+    def _parts(self) -> IntArray:
+        """The numbers of the connected parts of one colour, [R, Q]."""
+        parts: IntArray = label(self.which, background=-1, connectivity=1)
+        return parts
+
+    @property
+    def _rim(self) -> BoolArray:
+        """Which cells are at a side of the picture, [R, Q]."""
+        rim = np.ones(self.which.shape, bool)
+        rim[1:-1, 1:-1] = False
+        return rim
 
 
 class Tile(NamedTuple):
@@ -155,23 +170,6 @@ def mosaic(pixels: Float32Array, most: int, limit: float = 0.0) -> Scene | None:
             best, most = found, len(found) - 1
     enough = OF_COLORS * (len(cells.colors) - 1)
     return None if best is None or FEW < len(best) < enough else _scene(cells, best)
-
-
-def _parts(which: IntArray) -> IntArray:
-    """The numbers of the connected parts of one colour, from 1, of cells [R, Q]."""
-    parts, count = np.zeros(which.shape, int), 0
-    for color in np.unique(which):
-        labels, found = ndimage.label(which == color)
-        parts += np.where(labels > 0, labels + count, 0)
-        count += found
-    return parts
-
-
-def _at_rim(cells: BoolArray) -> BoolArray:
-    """Those of some cells [R, Q] that are connected to a side of the picture."""
-    labels, _ = ndimage.label(cells)
-    sides = np.concatenate([labels[0], labels[-1], labels[:, 0], labels[:, -1]])
-    return np.isin(labels, sides[sides > 0])
 
 
 def _lines(pixels: Float32Array, limit: float) -> IntArray:
@@ -268,16 +266,15 @@ def covered(part: BoolArray, free: BoolArray) -> list[Tile]:
     Where cells of the part meet one covers all of them: between two that only touch, a line is seen at other sizes.
     """
     tiles, whole = _maximal(free), _with_seams(part)
-    seams = 2 * tiles - np.array(
-        [0, 1, 0, 1]
-    )  # the same in rows and columns of cells and of what is between them
+    # the same rectangles in rows and columns of cells and of what is between them
+    seams = 2 * tiles - np.array([0, 1, 0, 1])
     left, chosen = whole.copy(), list[int]()
     while left.any():
         best = int(np.argmax(_sums(left, seams)))
-        left[_within(Tile(*seams[best].tolist()))] = False
+        left[_within(seams[best])] = False
         chosen.append(best)
-    kept = _needed([Tile(*seams[index].tolist()) for index in chosen], whole)
-    return [Tile(*tiles[chosen[index]].tolist()) for index in kept]
+    needed = _needed(seams[chosen], whole)
+    return [Tile(*tile) for tile in tiles[chosen][needed].tolist()]
 
 
 def _with_seams(part: BoolArray) -> BoolArray:
@@ -327,17 +324,16 @@ def _sums(cells: BoolArray, tiles: IntArray) -> IntArray:
     return found
 
 
-def _needed(tiles: Sequence[Tile], part: BoolArray) -> list[int]:
-    """Which of some rectangles cover something of a part that no others do."""
-    times, kept = np.zeros(part.shape, int), []
-    for tile in tiles:
-        times[_within(tile)] += 1
-    for index, own in enumerate(map(_within, tiles)):
-        if (times[own][part[own]] > 1).all():
-            times[own] -= 1
-        else:
-            kept.append(index)
-    return kept
+def _needed(tiles: IntArray, part: BoolArray) -> list[bool]:
+    """Which of some rectangles [N, 4] cover something of a part that no others do."""
+    times, owns = np.zeros(part.shape, int), [_within(tile) for tile in tiles]
+    for own in owns:
+        times[own] += 1
+    found = []
+    for own in owns:
+        found.append(bool((times[own][part[own]] == 1).any()))
+        times[own] -= not found[-1]
+    return found
 
 
 def _shrunk(tile: Tile, part: BoolArray) -> Tile:
@@ -347,9 +343,10 @@ def _shrunk(tile: Tile, part: BoolArray) -> Tile:
     return Tile(top, tile.top + int(rows.max()) + 1, left, tile.left + int(columns.max()) + 1)
 
 
-def _within(tile: Tile) -> tuple[slice, slice]:
+def _within(tile: Tile | IntArray) -> tuple[slice, slice]:
     """Where a rectangle's cells are."""
-    return slice(tile.top, tile.bottom), slice(tile.left, tile.right)
+    top, bottom, left, right = tile
+    return slice(top, bottom), slice(left, right)
 
 
 # --- the scene ------------------------------------------------------------------------------------------------
